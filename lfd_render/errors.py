@@ -1,0 +1,69 @@
+"""Every error a user can meet, and the exit code and HTTP status it becomes.
+
+A message names the file, the field, the value received and what would be right.
+"""
+
+
+class LfdError(Exception):
+    """Base of all errors raised on purpose; its text is one line for a person."""
+
+
+class UsageError(LfdError):
+    """The request itself is contradictory or out of range."""
+
+
+class SceneError(LfdError):
+    """A scene, texture or camera cannot be read or makes no sense."""
+
+
+class ProfileError(LfdError):
+    """A display profile cannot be read or describes an impossible display."""
+
+
+class GpuError(LfdError):
+    """No usable OpenGL device, or the device reported an error."""
+
+
+class ResourceError(LfdError):
+    """The request needs more memory, texels or pixels than allowed."""
+
+
+class PictureError(LfdError):
+    """An input picture cannot be read or does not fit the display."""
+
+
+class OutputError(LfdError):
+    """A result cannot be written."""
+
+
+EXIT_CODES: dict[type[LfdError], int] = {
+    UsageError: 2,
+    SceneError: 3,
+    ProfileError: 4,
+    GpuError: 5,
+    ResourceError: 6,
+    PictureError: 7,
+    OutputError: 8,
+}
+EXIT_INTERNAL = 1
+EXIT_INTERRUPTED = 130
+
+HTTP_STATUSES: dict[type[LfdError], int] = {
+    UsageError: 400,
+    SceneError: 422,
+    ProfileError: 422,
+    GpuError: 503,
+    ResourceError: 413,
+    PictureError: 422,
+    OutputError: 507,
+}
+
+
+def exit_code(error: LfdError) -> int:
+    """Exit code of the command line for an error, by its nearest listed class."""
+    return next((EXIT_CODES[c] for c in type(error).__mro__ if c in EXIT_CODES), EXIT_INTERNAL)
+
+
+def http_status(error: LfdError) -> int:
+    """HTTP status of an error, by its nearest listed class; 500 for none."""
+    return next((HTTP_STATUSES[c] for c in type(error).__mro__ if c in HTTP_STATUSES), 500)
