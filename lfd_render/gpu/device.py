@@ -1,0 +1,154 @@
+"""One OpenGL device through EGL: choosing it, describing it, checking it, owning what lives on it.
+
+A context belongs to the thread that opened it and does not survive a fork. This package is the
+only one that talks to moderngl; passes see `Device`, `Kernel`, `RasterProgram`, buffers, textures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import glcontext
+import moderngl
+
+from lfd_render.errors import GpuError
+from lfd_render.gpu.memory import Ledger
+from lfd_render.gpu.raw import ERRORS, RawGl
+
+REQUIRED_VERSION = 450
+SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "lavapipe")
+INSTALL_HINT = (
+    "install the GL libraries (Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri) "
+    "and run 'lfd-render doctor'"
+)
+_MAX_EGL_DEVICES = 16
+
+
+@dataclass(frozen=True)
+class DeviceInfo:
+    """What a context reports of itself; limits in the units of the GL specification."""
+
+    renderer: str
+    vendor: str
+    version: str
+    egl_index: int
+    software: bool
+    extensions: frozenset[str]
+    max_storage_bytes: int
+    max_texture_units: int
+    max_array_layers: int
+    max_texture_size: int
+    max_groups: int
+
+
+class Device:
+    """A context, the functions moderngl lacks, and the ledger of what was allocated."""
+
+    def __init__(self, loader: Any, egl_index: int) -> None:
+        self.context = moderngl.create_context(context=loader)
+        self.context.gc_mode = "context_gc"
+        self.raw = RawGl(loader)
+        self.ledger = Ledger()
+        self.info = _describe(self.context, egl_index)
+        self._closed = False
+
+    @classmethod
+    def open(cls, choice: str = "auto") -> Device:
+        """Open a device: ``auto`` (hardware if any, else software), ``gpu``, ``software``, or the
+        index of an EGL device.
+
+        Raises GpuError when none fits, naming what to install.
+        """
+        if choice.isdecimal():
+            return cls(_egl_context(int(choice)), int(choice))
+        if choice not in ("auto", "gpu", "software"):
+            raise GpuError(f"device '{choice}': unknown; use auto, gpu, software or an EGL index")
+        software_index: int | None = None
+        for device in _candidates():
+            if device.info.software == (choice == "software"):
+                return device
+            if software_index is None and device.info.software:
+                software_index = device.info.egl_index
+            device.close()
+        if choice != "auto" or software_index is None:
+            raise GpuError(f"device '{choice}': no such EGL device found; {INSTALL_HINT}")
+        return cls(_egl_context(software_index), software_index)
+
+    @property
+    def name(self) -> str:
+        """GL_RENDERER."""
+        return self.info.renderer
+
+    def finish(self) -> None:
+        """Wait until the device has done all that was asked."""
+        self.context.finish()
+
+    def barrier(self) -> None:
+        """Make shader writes visible to whatever runs next."""
+        self.context.memory_barrier()
+
+    def check(self) -> None:
+        """Raise GpuError when OpenGL has recorded an error since the last check."""
+        code = self.raw.glGetError()
+        if code:
+            raise GpuError(f"OpenGL on {self.name} reports {ERRORS.get(code, hex(code))}")
+
+    def collect(self) -> None:
+        """Free device objects whose Python owners are gone (moderngl's deferred collection)."""
+        self.context.gc()
+
+    def close(self) -> None:
+        """Free everything and the context. Calling it again does nothing."""
+        if not self._closed:
+            self._closed = True
+            self.context.gc()
+            self.context.release()
+
+
+def _describe(context: moderngl.Context, egl_index: int) -> DeviceInfo:
+    info = context.info
+    renderer = str(info["GL_RENDERER"])
+    return DeviceInfo(
+        renderer=renderer,
+        vendor=str(info["GL_VENDOR"]),
+        version=str(info["GL_VERSION"]),
+        egl_index=egl_index,
+        software=any(name in renderer.lower() for name in SOFTWARE_RENDERERS),
+        extensions=frozenset(context.extensions),
+        max_storage_bytes=int(info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"]),
+        max_texture_units=int(info["GL_MAX_TEXTURE_IMAGE_UNITS"]),
+        max_array_layers=int(info["GL_MAX_ARRAY_TEXTURE_LAYERS"]),
+        max_texture_size=int(info["GL_MAX_TEXTURE_SIZE"]),
+        max_groups=int(info["GL_MAX_COMPUTE_WORK_GROUP_COUNT"][0]),
+    )
+
+
+def _egl_context(index: int) -> Any:
+    try:
+        backend = glcontext.get_backend_by_name("egl")
+        return backend(mode="standalone", glversion=REQUIRED_VERSION, device_index=index)
+    except Exception as error:  # glcontext raises bare Exception for whatever EGL refuses
+        raise GpuError(
+            f"EGL device {index}: OpenGL {REQUIRED_VERSION / 100:.1f} unavailable ({error}); "
+            + INSTALL_HINT
+        ) from None
+
+
+def _candidates() -> Iterator[Device]:
+    """Each EGL device that gives a context, in EGL's order."""
+    first_error: GpuError | None = None
+    opened = False
+    for index in range(_MAX_EGL_DEVICES):
+        try:
+            loader = _egl_context(index)
+        except GpuError as error:
+            first_error = first_error or error
+            if "device index" in str(error) or "libEGL" in str(error):
+                break
+            continue
+        opened = True
+        yield Device(loader, index)
+    if not opened and first_error is not None:
+        raise first_error

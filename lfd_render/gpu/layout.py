@@ -1,0 +1,102 @@
+"""Structs that numpy and GLSL share, each declared once.
+
+A field list gives the numpy dtype (``dtype("Draw")``) and the GLSL text that a shader gets by
+``#include "layout/Draw"``. The layout is std430; fields are ordered so that no padding is needed,
+and `dtype` asserts it.
+"""
+
+import numpy as np
+
+# GLSL type → (numpy base type, count of components, std430 alignment in bytes)
+_TYPES: dict[str, tuple[str, int, int]] = {
+    "float": ("f4", 1, 4),
+    "int": ("i4", 1, 4),
+    "uint": ("u4", 1, 4),
+    "vec2": ("f4", 2, 8),
+    "uvec2": ("u4", 2, 8),
+    "vec4": ("f4", 4, 16),
+    "uvec4": ("u4", 4, 16),
+    "mat4": ("f4", 16, 16),
+}
+
+# Texture slot of a material, glTF 2.0 section 3.9.2.
+TEXTURE_ROLES = ("base_color", "metallic_roughness", "normal", "occlusion", "emissive")
+
+STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
+    # One mesh placed in the world. Normals go by the inverse transpose, kept as three columns.
+    "Draw": (
+        ("mat4", "display_from_local"),
+        ("vec4", "normal_matrix_x"),
+        ("vec4", "normal_matrix_y"),
+        ("vec4", "normal_matrix_z"),
+        ("uint", "material"),
+        ("uint", "facing"),  # FACING_* below
+        ("uint", "unused_0"),
+        ("uint", "unused_1"),
+    ),
+    # What shading reads at a vertex; positions stand apart because visibility reads only those.
+    "Vertex": (
+        ("vec2", "uv0"),
+        ("vec2", "uv1"),
+        ("uint", "normal_oct"),  # octahedral, 2 × snorm16, local space
+        ("uint", "color_rg"),  # 2 × unorm16, linear
+        ("uint", "color_ba"),
+        ("uint", "unused_0"),
+    ),
+    # A texture of a material: which array, which layer, and its KHR_texture_transform.
+    "TextureSlot": (
+        ("int", "group"),  # index among the arrays of its colour space, −1 when absent
+        ("int", "layer"),
+        ("int", "texcoord"),
+        ("float", "scale"),  # normal scale or occlusion strength
+        ("vec4", "uv_matrix"),  # columns of the 2×2 part
+        ("vec2", "uv_offset"),
+        ("vec2", "texels"),
+    ),
+    "Material": (
+        ("vec4", "base_color"),
+        ("vec4", "emissive"),  # rgb, w unused
+        ("float", "metallic"),
+        ("float", "roughness"),
+        ("float", "alpha_cutoff"),
+        ("uint", "alpha_mode"),  # ALPHA_* below
+        ("uint", "unlit"),
+        ("uint", "unused_0"),
+        ("uint", "unused_1"),
+        ("uint", "unused_2"),
+    ),
+    # A triangle that reaches some row of the band, and where its rows start in the list of items.
+    "Visible": (
+        ("uint", "triangle"),  # within its batch
+        ("uint", "first_item"),
+    ),
+}
+
+CONSTANTS: dict[str, int] = {
+    "FACING_FRONT": 0,  # counter-clockwise triangles are seen
+    "FACING_MIRRORED": 1,  # the placement mirrors, so clockwise ones are
+    "FACING_BOTH": 2,  # bit: double-sided
+    "ALPHA_OPAQUE": 0,
+    "ALPHA_MASK": 1,
+    "ALPHA_BLEND": 2,
+}
+
+
+def dtype(name: str) -> np.dtype[np.void]:
+    """The numpy dtype of a struct, byte for byte its std430 layout."""
+    fields = []
+    offset = alignment = 0
+    for glsl_type, field in STRUCTS[name]:
+        base, count, align = _TYPES[glsl_type]
+        assert offset % align == 0, f"{name}.{field} would need padding before it"
+        fields.append((field, base) if count == 1 else (field, base, (count,)))
+        offset += 4 * count
+        alignment = max(alignment, align)
+    assert offset % alignment == 0, f"{name} would need padding at its end"
+    return np.dtype(fields)
+
+
+def glsl(name: str) -> str:
+    """The GLSL declaration of a struct."""
+    body = "".join(f"    {glsl_type} {field};\n" for glsl_type, field in STRUCTS[name])
+    return f"struct {name} {{\n{body}}};\n"

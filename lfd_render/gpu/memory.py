@@ -1,0 +1,158 @@
+"""Device memory: buffers, texture arrays, and the ledger that counts every byte of them."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from lfd_render.errors import ResourceError
+from lfd_render.gpu import raw as gl
+
+if TYPE_CHECKING:
+    from lfd_render.gpu.device import Device
+
+
+class Ledger:
+    """Bytes that live on the device, by label, and their peak."""
+
+    def __init__(self) -> None:
+        self.by_label: dict[str, int] = {}
+        self.peak = 0
+
+    @property
+    def total(self) -> int:
+        """Bytes allocated now."""
+        return sum(self.by_label.values())
+
+    def add(self, label: str, size: int) -> None:
+        """Count an allocation (negative: a release)."""
+        self.by_label[label] = self.by_label.get(label, 0) + size
+        if not self.by_label[label]:
+            del self.by_label[label]
+        self.peak = max(self.peak, self.total)
+
+
+class Buffer:
+    """A storage buffer. Sizes are in bytes; contents travel as numpy arrays."""
+
+    def __init__(self, device: Device, label: str, size: int, data: bytes | None = None) -> None:
+        limit = device.info.max_storage_bytes
+        if size > limit:
+            raise ResourceError(
+                f"device buffer '{label}': {size} bytes exceed the limit of {limit} bytes on "
+                f"{device.name}; use fewer or smaller views, or a smaller scene"
+            )
+        self.label = label
+        self.size = max(4, size)
+        self._device = device
+        self.glo = device.context.buffer(data) if data else device.context.buffer(reserve=self.size)
+        device.ledger.add(label, self.size)
+
+    @classmethod
+    def of(cls, device: Device, label: str, array: NDArray[Any]) -> Buffer:
+        """A buffer that holds a copy of an array."""
+        data = np.ascontiguousarray(array).tobytes()
+        return cls(device, label, len(data), data)
+
+    def write(self, array: NDArray[Any], offset: int = 0) -> None:
+        """Copy an array into the buffer at a byte offset."""
+        self.glo.write(np.ascontiguousarray(array).tobytes(), offset=offset)
+
+    def read(self, dtype: DTypeLike, count: int = -1) -> NDArray[Any]:
+        """The buffer's first `count` elements (all by default) as an array. Waits for the device."""
+        size = -1 if count < 0 else count * np.dtype(dtype).itemsize
+        return np.frombuffer(self.glo.read(size), dtype=dtype)
+
+    def fill(self, word: int) -> None:
+        """Set every 32-bit word."""
+        self.glo.clear(chunk=np.uint32(word).tobytes())
+
+    def release(self) -> None:
+        """Give the memory back. The buffer must not be used afterwards."""
+        self._device.ledger.add(self.label, -self.size)
+        self.glo.release()
+
+
+class TextureArray:
+    """A 2D array texture with immutable storage: [layer, y, x], row 0 as uploaded."""
+
+    BYTES_PER_TEXEL = {gl.RGBA8: 4, gl.SRGB8_ALPHA8: 4, gl.RGBA16F: 8}
+
+    def __init__(
+        self,
+        device: Device,
+        label: str,
+        size: tuple[int, int, int],
+        internal_format: int,
+        *,
+        levels: int = 1,
+    ) -> None:
+        """size: (width, height, layers) in texels."""
+        width, height, layers = size
+        info = device.info
+        if max(width, height) > info.max_texture_size or layers > info.max_array_layers:
+            raise ResourceError(
+                f"texture '{label}': {width}×{height} with {layers} layers exceeds the limits of "
+                f"{device.name} ({info.max_texture_size} texels, {info.max_array_layers} layers)"
+            )
+        self.label = label
+        self.width, self.height, self.layers, self.levels = width, height, layers, levels
+        self.internal_format = internal_format
+        self._device = device
+        name = ctypes.c_uint()
+        device.raw.glCreateTextures(gl.TEXTURE_2D_ARRAY, 1, ctypes.byref(name))
+        self.name = int(name.value)
+        device.raw.glTextureStorage3D(self.name, levels, internal_format, width, height, layers)
+        device.check()
+        self.size = sum(
+            max(1, width >> level) * max(1, height >> level) for level in range(levels)
+        ) * (layers * self.BYTES_PER_TEXEL[internal_format])
+        device.ledger.add(label, self.size)
+
+    def upload(self, layer: int, pixels: NDArray[np.uint8]) -> None:
+        """Set level 0 of a layer from uint8 [y, x, 4]."""
+        assert pixels.shape == (self.height, self.width, 4)
+        data = np.ascontiguousarray(pixels)
+        self._device.raw.glTextureSubImage3D(
+            self.name, 0, 0, 0, layer, self.width, self.height, 1,
+            gl.RGBA, gl.UNSIGNED_BYTE, data.ctypes.data,
+        )  # fmt: skip
+
+    def generate_mipmaps(self) -> None:
+        """Fill levels 1 and up from level 0; sRGB formats average in linear light."""
+        self._device.raw.glGenerateTextureMipmap(self.name)
+
+    def parameters(self, minify: int, magnify: int, wrap: Sequence[str]) -> None:
+        """Filters (GL enums) and wraps (s, t: ``repeat``, ``clamp`` or ``mirror``)."""
+        raw = self._device.raw
+        raw.glTextureParameteri(self.name, gl.TEXTURE_MIN_FILTER, minify)
+        raw.glTextureParameteri(self.name, gl.TEXTURE_MAG_FILTER, magnify)
+        raw.glTextureParameteri(self.name, gl.TEXTURE_WRAP_S, gl.WRAPS[wrap[0]])
+        raw.glTextureParameteri(self.name, gl.TEXTURE_WRAP_T, gl.WRAPS[wrap[1]])
+
+    def bind(self, unit: int) -> None:
+        """Make the texture what samplers of this unit read."""
+        self._device.raw.glBindTextureUnit(unit, self.name)
+
+    def bind_image(self, unit: int) -> None:
+        """Make all layers what image stores of this unit write."""
+        self._device.raw.glBindImageTexture(
+            unit, self.name, 0, 1, 0, gl.WRITE_ONLY, self.internal_format
+        )
+
+    def read(self, dtype: DTypeLike, gl_type: int) -> NDArray[Any]:
+        """Level 0 as [layer, y, x, 4]. Waits for the device."""
+        pixels = np.empty((self.layers, self.height, self.width, 4), dtype)
+        self._device.raw.glGetTextureImage(
+            self.name, 0, gl.RGBA, gl_type, pixels.nbytes, pixels.ctypes.data
+        )
+        return pixels
+
+    def release(self) -> None:
+        """Give the memory back. The texture must not be used afterwards."""
+        self._device.ledger.add(self.label, -self.size)
+        self._device.raw.glDeleteTextures(1, ctypes.byref(ctypes.c_uint(self.name)))

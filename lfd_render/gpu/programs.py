@@ -1,0 +1,127 @@
+"""Compiled shaders: storage blocks, uniforms and samplers are set by name, a wrong name raises."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import moderngl
+
+from lfd_render.errors import GpuError
+from lfd_render.gpu.memory import Buffer, TextureArray
+from lfd_render.gpu.shaders import Source, assemble
+
+if TYPE_CHECKING:
+    from lfd_render.gpu.device import Device
+
+Uniform = int | float | tuple[Any, ...] | bytes
+Samplers = Mapping[str, "TextureArray | list[TextureArray]"]
+
+
+class _Program:
+    """What compute and raster programs share: binding by name."""
+
+    def __init__(self, device: Device, path: str, program: Any) -> None:
+        self.path = path
+        self._device = device
+        self._program = program
+        self._blocks: dict[str, int] = {}
+        self._uniforms: set[str] = set()
+        for name in program:
+            member = program[name]
+            if isinstance(member, moderngl.StorageBlock):
+                member.binding = len(self._blocks)
+                self._blocks[name] = member.binding
+            elif isinstance(member, moderngl.Uniform):
+                self._uniforms.add(name)
+
+    def set(
+        self,
+        buffers: Mapping[str, Buffer],
+        uniforms: Mapping[str, Uniform] | None = None,
+        samplers: Samplers | None = None,
+    ) -> None:
+        """Bind what the next run reads and writes. Names must be exactly those of the shader."""
+        given = {*(uniforms or {}), *(samplers or {})}
+        if set(buffers) != set(self._blocks) or given != self._uniforms:
+            raise GpuError(
+                f"shader '{self.path}': has blocks {sorted(self._blocks)} and uniforms "
+                f"{sorted(self._uniforms)}, was given {sorted(buffers)} and {sorted(given)}"
+            )
+        for name, buffer in buffers.items():
+            buffer.glo.bind_to_storage_buffer(self._blocks[name])
+        for name, value in (uniforms or {}).items():
+            uniform = self._program[name]
+            if isinstance(value, bytes):
+                uniform.write(value)
+            else:
+                uniform.value = value
+        self._set_samplers(samplers or {})
+
+    def _set_samplers(self, samplers: Samplers) -> None:
+        unit = 0
+        for name, textures in samplers.items():
+            group = textures if isinstance(textures, list) else [textures]
+            for offset, texture in enumerate(group):
+                texture.bind(unit + offset)
+            units = list(range(unit, unit + len(group)))
+            self._program[name].value = units[0] if len(units) == 1 else units
+            unit += len(group)
+
+    def release(self) -> None:
+        """Free the program."""
+        self._program.release()
+
+
+class Kernel(_Program):
+    """A compute shader."""
+
+    def __init__(
+        self, device: Device, path: str, constants: Mapping[str, int | float] | None = None
+    ) -> None:
+        source = assemble(path, constants)
+        super().__init__(device, path, _compile(source, device.context.compute_shader, source.text))
+
+    def run(self, groups: tuple[int, int, int]) -> None:
+        """Dispatch that many work groups, then make their writes visible."""
+        if min(groups) > 0:
+            assert max(groups) <= self._device.info.max_groups, f"{self.path}: {groups} groups"
+            self._program.run(*groups)
+            self._device.barrier()
+
+    def run_indirect(self, buffer: Buffer, offset: int = 0) -> None:
+        """Dispatch as many groups as three words of a buffer say, at a byte offset."""
+        self._program.run_indirect(buffer.glo, offset)
+        self._device.barrier()
+
+
+class RasterProgram(_Program):
+    """A vertex and a fragment shader."""
+
+    def __init__(
+        self,
+        device: Device,
+        vertex_path: str,
+        fragment_path: str,
+        constants: Mapping[str, int | float] | None = None,
+    ) -> None:
+        vertex, fragment = assemble(vertex_path, constants), assemble(fragment_path, constants)
+
+        def build(vertex_text: str) -> Any:
+            return device.context.program(vertex_shader=vertex_text, fragment_shader=fragment.text)
+
+        super().__init__(
+            device, f"{vertex_path} + {fragment_path}", _compile(fragment, build, vertex.text)
+        )
+
+    @property
+    def glo(self) -> Any:
+        """The moderngl program, for vertex arrays made inside this package."""
+        return self._program
+
+
+def _compile(source: Source, build: Any, text: str) -> Any:
+    try:
+        return build(text)
+    except moderngl.Error as error:
+        raise GpuError(f"shader '{source.path}': {source.explain(str(error))}") from None

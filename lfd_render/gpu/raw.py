@@ -1,0 +1,66 @@
+"""OpenGL entry points that moderngl does not offer, by ctypes: sRGB arrays, DSA binding, errors."""
+
+import ctypes
+from typing import Any
+
+# moderngl 5.13 has no internal format for arrays and no layered depth; these calls fill the gap.
+TEXTURE_2D_ARRAY = 0x8C1A
+SRGB8_ALPHA8 = 0x8C43
+RGBA8 = 0x8058
+RGBA16F = 0x881A
+RGBA = 0x1908
+UNSIGNED_BYTE = 0x1401
+TEXTURE_MIN_FILTER = 0x2801
+TEXTURE_MAG_FILTER = 0x2800
+TEXTURE_WRAP_S = 0x2802
+TEXTURE_WRAP_T = 0x2803
+NEAREST = 0x2600
+LINEAR = 0x2601
+LINEAR_MIPMAP_LINEAR = 0x2703
+WRAPS = {"repeat": 0x2901, "clamp": 0x812F, "mirror": 0x8370}
+WRITE_ONLY = 0x88B9
+COLOR_ATTACHMENT0 = 0x8CE0
+FRAMEBUFFER_COMPLETE = 0x8CD5
+
+ERRORS = {
+    0x0500: "GL_INVALID_ENUM",
+    0x0501: "GL_INVALID_VALUE",
+    0x0502: "GL_INVALID_OPERATION",
+    0x0503: "GL_STACK_OVERFLOW",
+    0x0504: "GL_STACK_UNDERFLOW",
+    0x0505: "GL_OUT_OF_MEMORY",
+    0x0506: "GL_INVALID_FRAMEBUFFER_OPERATION",
+    0x0507: "GL_CONTEXT_LOST",
+}
+
+_u = ctypes.c_uint
+_i = ctypes.c_int
+_p = ctypes.c_void_p
+_SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
+    "glGetError": (_u, ()),
+    "glGetIntegerv": (None, (_u, _p)),
+    "glCreateTextures": (None, (_u, _i, _p)),
+    "glDeleteTextures": (None, (_i, _p)),
+    "glTextureStorage3D": (None, (_u, _i, _u, _i, _i, _i)),
+    "glTextureSubImage3D": (None, (_u, _i, _i, _i, _i, _i, _i, _i, _u, _u, _p)),
+    "glTextureParameteri": (None, (_u, _u, _i)),
+    "glGenerateTextureMipmap": (None, (_u,)),
+    "glBindTextureUnit": (None, (_u, _u)),
+    "glBindImageTexture": (None, (_u, _u, _i, ctypes.c_ubyte, _i, _u, _u)),
+    "glGetTextureImage": (None, (_u, _i, _u, _u, _i, _p)),
+    "glMemoryBarrier": (None, (_u,)),
+}
+
+
+class RawGl:
+    """The functions of _SIGNATURES, loaded once from the current context."""
+
+    def __init__(self, loader: Any) -> None:
+        self._functions: dict[str, Any] = {}
+        for name, (result, arguments) in _SIGNATURES.items():
+            address = loader.load_opengl_function(name)
+            assert address, f"OpenGL has no {name}"
+            self._functions[name] = ctypes.CFUNCTYPE(result, *arguments)(address)
+
+    def __getattr__(self, name: str) -> Any:
+        return self._functions[name]
