@@ -1,0 +1,62 @@
+"""`builtin:NAME?triangles=N`: scenes made by the program itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from urllib.parse import parse_qsl
+
+from lfd_render.errors import SceneError
+
+from .model import Scene
+from .procedural.spheres import spheres
+
+PREFIX = "builtin:"
+
+
+@dataclass(frozen=True)
+class Builtin:
+    """A maker of scenes and the range of each of its whole-number options."""
+
+    make: Callable[..., Scene]
+    ranges: Mapping[str, tuple[int, int]]
+    defaults: Mapping[str, int]
+
+
+_TRIANGLES = (1_000, 10_000_000)
+
+BUILTINS: dict[str, Builtin] = {
+    "spheres": Builtin(spheres, {"triangles": _TRIANGLES}, {"triangles": 100_000}),
+}
+
+
+def load_builtin(source: str) -> Scene:
+    """Make the scene that `builtin:NAME?option=value&…` names.
+
+    Raises SceneError, listing the choices, on an unknown name or option or a value out of range.
+    """
+    name, _, query = source.removeprefix(PREFIX).partition("?")
+    if name not in BUILTINS:
+        raise SceneError(f"builtin: '{name}'; give one of {', '.join(sorted(BUILTINS))}")
+    builtin = BUILTINS[name]
+    options = dict(builtin.defaults)
+    for key, text in _query_items(query):
+        if key not in builtin.ranges:
+            raise SceneError(f"option: '{key}'; {name} takes {', '.join(sorted(builtin.ranges))}")
+        options[key] = _whole_number(key, text, *builtin.ranges[key])
+    return builtin.make(**options)
+
+
+def _query_items(query: str) -> list[tuple[str, str]]:
+    try:
+        return parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
+    except ValueError:
+        raise SceneError(f"options: '{query}'; write them as name=value&name=value") from None
+
+
+def _whole_number(key: str, text: str, low: int, high: int) -> int:
+    # isdecimal first: int() also takes signs, spaces, underscores and very long texts.
+    value = int(text) if text.isascii() and text.isdecimal() and len(text) < 12 else None
+    if value is None or not low <= value <= high:
+        raise SceneError(f"{key}: '{text}'; give a whole number from {low} to {high}")
+    return value
