@@ -14,7 +14,7 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -200,28 +200,37 @@ def _advice(packages: Sequence[str]) -> str:
 
 def main(requests: Sequence[str]) -> int:
     """Provide each requested part; exit status 1 when a needed one is still missing."""
-    needed = {request.rstrip("?"): not request.endswith("?") for request in requests}
-    problems = {part: problem for part in needed if (problem := PARTS[part][0]())}
-    packages = [package for part in problems for package in PARTS[part][1]]
-    if not packages:
-        return 0
-
-    privilege = _privilege()
+    missing = _missing(requests)
+    privilege = _privilege() if missing else None
     if privilege is not None:
+        packages = _packages(missing)
         print(f"Installing system packages: {' '.join(packages)}", file=sys.stderr, flush=True)
         if _install(packages, privilege):
-            # A fresh process, because the loader and the import system remember what was missing.
-            again = [part + ("" if needed[part] else "?") for part in problems]
-            return subprocess.run([sys.executable, __file__, "--check", *again]).returncode
-    return _report(problems, needed)
+            # A fresh process, because this one's loader remembers which libraries were missing.
+            return int(not _run([sys.executable, __file__, "--check", *requests]))
+    return _report(missing, requests)
 
 
-def _report(problems: dict[str, str], needed: dict[str, bool]) -> int:
-    for part, problem in problems.items():
-        word = "needed" if needed[part] else "wanted"
-        print(f"{word}: {part}: {problem}.\n{_advice(PARTS[part][1])}", file=sys.stderr)
-    return int(any(needed[part] for part in problems))
+def _missing(requests: Sequence[str]) -> dict[str, str]:
+    """What is wrong with each requested part that is not there."""
+    parts = [request.removesuffix("?") for request in requests]
+    return {part: problem for part in parts if (problem := PARTS[part][0]())}
+
+
+def _packages(parts: Iterable[str]) -> list[str]:
+    return [package for part in parts for package in PARTS[part][1]]
+
+
+def _report(missing: dict[str, str], requests: Sequence[str]) -> int:
+    """Say what is missing and how to mend it; 1 when something needed is."""
+    for part, problem in missing.items():
+        print(f"{part} is missing: {problem}", file=sys.stderr)
+    if missing:
+        print(_advice(_packages(missing)), file=sys.stderr)
+    return int(any(part in requests for part in missing))
 
 
 if __name__ == "__main__":
+    if sys.argv[1] == "--check":
+        sys.exit(_report(_missing(sys.argv[2:]), sys.argv[2:]))
     sys.exit(main(sys.argv[1:]))
