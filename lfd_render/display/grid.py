@@ -70,6 +70,14 @@ class ViewGrid:
         rows = round(width * height / (views * int(np.ceil(profile.lens_count))))
         return min(max(rows, 1), height)
 
+    def first_panel_rows(self, height: int) -> NDArray[np.int64]:
+        """First panel row whose centre lies in each row of the view, [rows + 1]; ends with height.
+
+        Panel row y belongs to view row floor((y+½)·rows/height).
+        """
+        edges = 2 * np.arange(self.rows + 1, dtype=np.int64) * height - self.rows
+        return -(-edges // (2 * self.rows))
+
     def row_mm(self) -> Float64:
         """Window y of the row centres, [rows], top row first."""
         return (0.5 - (np.arange(self.rows) + 0.5) / self.rows) * self.panel_mm[1]

@@ -6,7 +6,7 @@ the canonical numbers.
 """
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -78,7 +78,15 @@ class Lens(StrictModel):
     gap_mm: Millimetres | None = None
 
 
-class LensStatement(StrictModel):
+def _one_of_each(schema: dict[str, Any]) -> None:
+    """Say in the JSON Schema what `resolve_lens` asks for."""
+    schema["allOf"] = [
+        {"anyOf": [{"required": ["drift"]}, {"required": ["tilt_deg"]}]},
+        {"anyOf": [{"required": ["lens_count"]}, {"required": ["pitch_mm", "gap_mm"]}]},
+    ]
+
+
+class LensStatement(StrictModel, json_schema_extra=_one_of_each):
     """The lens sheet as a file may state it: drift or tilt, count or pitch with gap."""
 
     lens_count: LensCount | None = None

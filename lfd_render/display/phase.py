@@ -47,6 +47,7 @@ class PhaseTables:
         """Cell kind of the pixels at column x and row y from the top, broadcast together."""
         y_up = self.row.shape[0] - 1 - y
         x, y_up = np.broadcast_arrays(x, y_up)
+        kind: NDArray[np.int64]
         match self.pattern_mode:
             case 1:
                 kind = (x + y_up) % 2
@@ -74,6 +75,16 @@ class PhaseTables:
         else:
             y = np.arange(height)[rows]
             phase += self.cell[self.kind_at(np.arange(width)[None, :], y[:, None])]
+        return phase
+
+    def phase_at(self, x: NDArray[np.int64], y: NDArray[np.int64]) -> Float64:
+        """Phase φ of subpixels, x [..., channel] and y from the top, broadcast together."""
+        channel = np.arange(3)
+        phase: Float64 = self.column[x, channel] + self.row[y]
+        if len(self.cell) == 1:
+            phase += self.cell[0]
+        else:
+            phase += self.cell[self.kind_at(x, y), channel]
         return phase
 
     def view_index_map(self, views: int) -> NDArray[np.uint16]:

@@ -1,0 +1,1 @@
+"""The panel image: picture files and the virtual panel."""

@@ -1,0 +1,89 @@
+"""Picture files: panel images and views in and out, never half written."""
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, PngImagePlugin, UnidentifiedImageError
+
+from ..display.files import replacing
+from ..errors import PictureError, UsageError
+
+Pixels = NDArray[np.uint8]
+
+READABLE = ("PNG", "WEBP", "TIFF", "BMP", "JPEG")
+MAX_PIXELS = 1 << 26  # two 8K panels
+# Modes of 8 bits a channel; a 16-bit grey or float picture is no panel image.
+_EIGHT_BIT_MODES = ("1", "L", "LA", "P", "PA", "RGB", "RGBA", "RGBX", "CMYK", "YCbCr")
+PNG_LEVEL = 1  # of zlib: a 4K panel image in a third of the default level's time
+
+
+def read_picture(path: str | Path) -> Pixels:
+    """Pixels of a PNG, WebP, TIFF, BMP or JPEG, uint8 [y, x, 3], alpha dropped.
+
+    Orientation tags are not applied: a panel image is the panel's pixels as stored. Raises
+    PictureError for a file that is missing, damaged, of another kind or above 67 megapixels.
+    """
+    with _opened(Path(path)) as image:
+        if image.mode not in _EIGHT_BIT_MODES:
+            raise PictureError(
+                f"{path}: has pixels of mode {image.mode}; convert it to 8 bits a channel"
+            )
+        return np.array(image.convert("RGB"))
+
+
+def read_png_text(path: str | Path) -> dict[str, str]:
+    """Text entries of a PNG, by key; empty for other formats. Raises PictureError."""
+    with _opened(Path(path)) as image:
+        if not isinstance(image, PngImagePlugin.PngImageFile):
+            return {}
+        return {key: str(value) for key, value in image.text.items()}
+
+
+def write_png(path: str | Path, pixels: Pixels, text: dict[str, str] | None = None) -> None:
+    """Write uint8 [y, x, 3] as a PNG with text entries; the file appears whole or not at all.
+
+    Raises OutputError when the file cannot be written, UsageError for other pixels.
+    """
+    if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[2] != 3 or not pixels.size:
+        raise UsageError(
+            f"{path}: pixels are {pixels.dtype} {list(pixels.shape)}; "
+            "they should be uint8 [y, x, 3]"
+        )
+    info = PngImagePlugin.PngInfo()
+    for key, value in (text or {}).items():
+        info.add_text(key, value)
+    image = Image.fromarray(np.ascontiguousarray(pixels))
+    with replacing(Path(path)) as temporary:
+        image.save(temporary, format="PNG", compress_level=PNG_LEVEL, pnginfo=info)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Image.Image]:
+    """A picture of an accepted kind and size; whatever goes wrong is a PictureError."""
+    kinds = ", ".join(READABLE)
+    try:
+        with warnings.catch_warnings():
+            # Pillow's own size warning; the limit below is stricter and an error.
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            opened = Image.open(path, formats=READABLE)
+        with opened as image:
+            width, height = image.size
+            if width * height > MAX_PIXELS:
+                raise PictureError(
+                    f"{path}: has {width} x {height} pixels; at most {MAX_PIXELS} can be read"
+                )
+            image.load()
+            yield image
+    except UnidentifiedImageError as cause:
+        raise PictureError(f"{path}: is not a picture of a known kind; give {kinds}") from cause
+    except Image.DecompressionBombError as cause:
+        raise PictureError(
+            f"{path}: is too large; at most {MAX_PIXELS} pixels can be read"
+        ) from cause
+    except (OSError, ValueError, SyntaxError, EOFError) as cause:
+        reason = (isinstance(cause, OSError) and cause.strerror) or str(cause)
+        raise PictureError(f"{path}: cannot be read: {reason}; give a {kinds} file") from cause
