@@ -46,9 +46,10 @@ class DeviceInfo:
 class Device:
     """A context, the functions moderngl lacks, and the ledger of what was allocated."""
 
+    triangles_mode: int = moderngl.TRIANGLES
+
     def __init__(self, loader: Any, egl_index: int) -> None:
         self.context = moderngl.create_context(context=loader)
-        self.context.gc_mode = "context_gc"
         self.raw = RawGl(loader)
         self.ledger = Ledger()
         self.info = _describe(self.context, egl_index)
@@ -95,15 +96,10 @@ class Device:
         if code:
             raise GpuError(f"OpenGL on {self.name} reports {ERRORS.get(code, hex(code))}")
 
-    def collect(self) -> None:
-        """Free device objects whose Python owners are gone (moderngl's deferred collection)."""
-        self.context.gc()
-
     def close(self) -> None:
         """Free everything and the context. Calling it again does nothing."""
         if not self._closed:
             self._closed = True
-            self.context.gc()
             self.context.release()
 
 

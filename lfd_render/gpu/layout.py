@@ -65,10 +65,42 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("uint", "unused_1"),
         ("uint", "unused_2"),
     ),
+    # One band of one frame: window, view grid and the extreme eyes. Also valid as std140.
+    "Frame": (
+        ("float", "distance_mm"),  # eye to window, D
+        ("float", "near_mm"),  # nearest depth drawn, from the eye
+        ("float", "panel_width_mm"),
+        ("float", "panel_height_mm"),
+        ("float", "column_mm"),  # width of a view column on the window
+        ("float", "row_mm"),
+        ("float", "eye_first"),  # leftmost and rightmost eye, in columns
+        ("float", "eye_last"),
+        ("int", "columns"),
+        ("int", "rows"),  # of the whole view
+        ("int", "views"),
+        ("int", "band_first"),  # first row of this band
+        ("int", "band_rows"),
+        ("uint", "triangles"),  # of this batch
+        ("uint", "triangle_base"),  # global id of the batch's first triangle
+        ("uint", "seed"),
+    ),
+    # The rows of a triangle that can be seen, first | count << 16, and the length of its points.
+    "Span": (
+        ("uint", "rows"),
+        ("float", "point_columns"),
+    ),
     # A triangle that reaches some row of the band, and where its rows start in the list of items.
     "Visible": (
         ("uint", "triangle"),  # within its batch
         ("uint", "first_item"),
+    ),
+    # Counts of the sampler: the first three words dispatch the splatter.
+    "Work": (
+        ("uint", "groups_x"),
+        ("uint", "groups_y"),
+        ("uint", "groups_z"),
+        ("uint", "visible"),
+        ("uint", "items"),  # rows of visible triangles
     ),
 }
 
@@ -76,6 +108,8 @@ CONSTANTS: dict[str, int] = {
     "FACING_FRONT": 0,  # counter-clockwise triangles are seen
     "FACING_MIRRORED": 1,  # the placement mirrors, so clockwise ones are
     "FACING_BOTH": 2,  # bit: double-sided
+    "TEXTURE_ROLES": len(TEXTURE_ROLES),
+    "NO_TRIANGLE": 0xFFFFFFFF,  # the word of a view pixel that shows the background
     "ALPHA_OPAQUE": 0,
     "ALPHA_MASK": 1,
     "ALPHA_BLEND": 2,

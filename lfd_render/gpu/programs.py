@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,10 @@ from lfd_render.gpu.shaders import Source, assemble
 if TYPE_CHECKING:
     from lfd_render.gpu.device import Device
 
+# Names of storage and uniform blocks, and of single uniforms and uniform arrays.
+_DECLARATION = re.compile(r"\b(?:buffer|uniform)\s+(?:\w+\s+)?(\w+)\s*(?:\[[^\]]*\])?\s*[;{]")
+_IMAGE = re.compile(r"\bimage\w+\s+(\w+)\s*;")
+
 Uniform = int | float | tuple[Any, ...] | bytes
 Samplers = Mapping[str, "TextureArray | list[TextureArray]"]
 
@@ -21,18 +26,21 @@ Samplers = Mapping[str, "TextureArray | list[TextureArray]"]
 class _Program:
     """What compute and raster programs share: binding by name."""
 
-    def __init__(self, device: Device, path: str, program: Any) -> None:
+    def __init__(self, device: Device, path: str, text: str, program: Any) -> None:
         self.path = path
         self._device = device
         self._program = program
-        self._blocks: dict[str, int] = {}
+        self._declared = set(_DECLARATION.findall(text))
+        self._blocks: dict[str, tuple[bool, int]] = {}  # name → (storage, binding)
         self._uniforms: set[str] = set()
+        images = _IMAGE.findall(text)  # images state their binding in the source
         for name in program:
             member = program[name]
-            if isinstance(member, moderngl.StorageBlock):
+            if isinstance(member, moderngl.StorageBlock | moderngl.UniformBlock):
                 member.binding = len(self._blocks)
-                self._blocks[name] = member.binding
-            elif isinstance(member, moderngl.Uniform):
+                storage = isinstance(member, moderngl.StorageBlock)
+                self._blocks[name] = (storage, member.binding)
+            elif isinstance(member, moderngl.Uniform) and name not in images:
                 self._uniforms.add(name)
 
     def set(
@@ -41,16 +49,29 @@ class _Program:
         uniforms: Mapping[str, Uniform] | None = None,
         samplers: Samplers | None = None,
     ) -> None:
-        """Bind what the next run reads and writes. Names must be exactly those of the shader."""
-        given = {*(uniforms or {}), *(samplers or {})}
-        if set(buffers) != set(self._blocks) or given != self._uniforms:
+        """Bind what the next run reads and writes, by the names in the shader's source.
+
+        A name that the source lacks raises, and so does a missing one. What a compiler has removed
+        as unused may be given; compilers differ in that.
+        """
+        given = {*buffers, *(uniforms or {}), *(samplers or {})}
+        missing = {*self._blocks, *self._uniforms} - given
+        unknown = given - self._declared
+        if missing or unknown:
             raise GpuError(
-                f"shader '{self.path}': has blocks {sorted(self._blocks)} and uniforms "
-                f"{sorted(self._uniforms)}, was given {sorted(buffers)} and {sorted(given)}"
+                f"shader '{self.path}': lacks {sorted(missing)}, does not know {sorted(unknown)}"
             )
         for name, buffer in buffers.items():
-            buffer.glo.bind_to_storage_buffer(self._blocks[name])
+            if name not in self._blocks:
+                continue
+            storage, binding = self._blocks[name]
+            if storage:
+                buffer.glo.bind_to_storage_buffer(binding)
+            else:
+                buffer.glo.bind_to_uniform_block(binding)
         for name, value in (uniforms or {}).items():
+            if name not in self._uniforms:
+                continue
             uniform = self._program[name]
             if isinstance(value, bytes):
                 uniform.write(value)
@@ -61,6 +82,8 @@ class _Program:
     def _set_samplers(self, samplers: Samplers) -> None:
         unit = 0
         for name, textures in samplers.items():
+            if name not in self._uniforms:
+                continue
             group = textures if isinstance(textures, list) else [textures]
             for offset, texture in enumerate(group):
                 texture.bind(unit + offset)
@@ -80,7 +103,9 @@ class Kernel(_Program):
         self, device: Device, path: str, constants: Mapping[str, int | float] | None = None
     ) -> None:
         source = assemble(path, constants)
-        super().__init__(device, path, _compile(source, device.context.compute_shader, source.text))
+        super().__init__(
+            device, path, source.text, _compile(source, device.context.compute_shader, source.text)
+        )
 
     def run(self, groups: tuple[int, int, int]) -> None:
         """Dispatch that many work groups, then make their writes visible."""
@@ -111,7 +136,10 @@ class RasterProgram(_Program):
             return device.context.program(vertex_shader=vertex_text, fragment_shader=fragment.text)
 
         super().__init__(
-            device, f"{vertex_path} + {fragment_path}", _compile(fragment, build, vertex.text)
+            device,
+            f"{vertex_path} + {fragment_path}",
+            vertex.text + fragment.text,
+            _compile(fragment, build, vertex.text),
         )
 
     @property

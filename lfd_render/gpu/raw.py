@@ -20,7 +20,24 @@ LINEAR_MIPMAP_LINEAR = 0x2703
 WRAPS = {"repeat": 0x2901, "clamp": 0x812F, "mirror": 0x8370}
 WRITE_ONLY = 0x88B9
 COLOR_ATTACHMENT0 = 0x8CE0
-FRAMEBUFFER_COMPLETE = 0x8CD5
+DEPTH_ATTACHMENT = 0x8D00
+DEPTH_COMPONENT32F = 0x8CAC
+RENDERBUFFER = 0x8D41
+FRAMEBUFFER = 0x8D40
+READ_FRAMEBUFFER = 0x8CA8
+COLOR = 0x1800
+DEPTH = 0x1801
+RGB = 0x1907
+HALF_FLOAT = 0x140B
+PACK_ALIGNMENT = 0x0D05
+DEPTH_TEST = 0x0B71
+CULL_FACE = 0x0B44
+SCISSOR_TEST = 0x0C11
+CLIP_DISTANCE0 = 0x3000
+CW = 0x0900
+CCW = 0x0901
+BACK = 0x0405
+LESS = 0x0201
 
 ERRORS = {
     0x0500: "GL_INVALID_ENUM",
@@ -48,7 +65,24 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "glBindTextureUnit": (None, (_u, _u)),
     "glBindImageTexture": (None, (_u, _u, _i, ctypes.c_ubyte, _i, _u, _u)),
     "glGetTextureImage": (None, (_u, _i, _u, _u, _i, _p)),
-    "glMemoryBarrier": (None, (_u,)),
+    "glCreateFramebuffers": (None, (_i, _p)),
+    "glDeleteFramebuffers": (None, (_i, _p)),
+    "glCreateRenderbuffers": (None, (_i, _p)),
+    "glDeleteRenderbuffers": (None, (_i, _p)),
+    "glNamedRenderbufferStorage": (None, (_u, _u, _i, _i)),
+    "glNamedFramebufferRenderbuffer": (None, (_u, _u, _u, _u)),
+    "glNamedFramebufferTextureLayer": (None, (_u, _u, _u, _i, _i)),
+    "glBindFramebuffer": (None, (_u, _u)),
+    "glClearNamedFramebufferfv": (None, (_u, _u, _i, _p)),
+    "glViewport": (None, (_i, _i, _i, _i)),
+    "glScissor": (None, (_i, _i, _i, _i)),
+    "glReadPixels": (None, (_i, _i, _i, _i, _u, _u, _p)),
+    "glPixelStorei": (None, (_u, _i)),
+    "glEnable": (None, (_u,)),
+    "glDisable": (None, (_u,)),
+    "glFrontFace": (None, (_u,)),
+    "glCullFace": (None, (_u,)),
+    "glDepthFunc": (None, (_u,)),
 }
 
 

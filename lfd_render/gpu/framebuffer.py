@@ -1,0 +1,114 @@
+"""Raster targets: layers of texture arrays with a depth buffer, and draws into them.
+
+moderngl attaches neither a layer of an immutable array nor layered depth, so this is raw OpenGL.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lfd_render.gpu import raw as gl
+from lfd_render.gpu.memory import Buffer, TextureArray
+from lfd_render.gpu.programs import RasterProgram
+
+if TYPE_CHECKING:
+    from lfd_render.gpu.device import Device
+
+
+class LayerTarget:
+    """A framebuffer over one layer at a time of a texture array."""
+
+    def __init__(self, device: Device, texture: TextureArray, *, depth: bool) -> None:
+        self.texture = texture
+        self._device = device
+        self._depth = ctypes.c_uint()
+        self._name = ctypes.c_uint()
+        raw = device.raw
+        raw.glCreateFramebuffers(1, ctypes.byref(self._name))
+        if depth:
+            raw.glCreateRenderbuffers(1, ctypes.byref(self._depth))
+            raw.glNamedRenderbufferStorage(
+                self._depth, gl.DEPTH_COMPONENT32F, texture.width, texture.height
+            )
+            raw.glNamedFramebufferRenderbuffer(
+                self._name, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, self._depth
+            )
+            device.ledger.add("depth", 4 * texture.width * texture.height)
+
+    def use(self, layer: int) -> None:
+        """Draw into this layer from now on, all of it."""
+        raw = self._device.raw
+        raw.glNamedFramebufferTextureLayer(
+            self._name, gl.COLOR_ATTACHMENT0, self.texture.name, 0, layer
+        )
+        raw.glBindFramebuffer(gl.FRAMEBUFFER, self._name)
+        raw.glViewport(0, 0, self.texture.width, self.texture.height)
+
+    def clear(self, color: tuple[float, float, float, float]) -> None:
+        """Set the layer in use to a colour and its depth to farthest."""
+        value = (ctypes.c_float * 4)(*color)
+        self._device.raw.glClearNamedFramebufferfv(self._name, gl.COLOR, 0, value)
+        if self._depth.value:
+            self._device.raw.glClearNamedFramebufferfv(
+                self._name, gl.DEPTH, 0, ctypes.byref(ctypes.c_float(1.0))
+            )
+
+    def read_rgb(self, gl_type: int, dtype: type[np.generic]) -> NDArray[np.generic]:
+        """The layer in use as [y, x, 3], row 0 first. Waits for the device."""
+        width, height = self.texture.width, self.texture.height
+        pixels = np.empty((height, width, 3), dtype)
+        raw = self._device.raw
+        raw.glBindFramebuffer(gl.READ_FRAMEBUFFER, self._name)
+        raw.glPixelStorei(gl.PACK_ALIGNMENT, 1)
+        raw.glReadPixels(0, 0, width, height, gl.RGB, gl_type, pixels.ctypes.data)
+        return pixels
+
+    def release(self) -> None:
+        """Free the framebuffer and its depth buffer, not the texture."""
+        raw = self._device.raw
+        raw.glDeleteFramebuffers(1, ctypes.byref(self._name))
+        if self._depth.value:
+            raw.glDeleteRenderbuffers(1, ctypes.byref(self._depth))
+            self._device.ledger.add("depth", -4 * self.texture.width * self.texture.height)
+
+
+class IndexedDraws:
+    """Triangles by an index buffer; vertices are pulled from storage blocks by gl_VertexID."""
+
+    def __init__(self, device: Device, program: RasterProgram, indices: Buffer) -> None:
+        self._device = device
+        self._vao = device.context.vertex_array(program.glo, [], index_buffer=indices.glo)
+
+    def draw(self, first: int, count: int) -> None:
+        """Draw `count` triangles from the `first` on."""
+        self._vao.render(self._device.triangles_mode, vertices=3 * count, first=3 * first)
+
+    def release(self) -> None:
+        """Free the vertex array."""
+        self._vao.release()
+
+
+class ScreenDraw:
+    """A program run once for each pixel of the target in use."""
+
+    def __init__(self, device: Device, program: RasterProgram) -> None:
+        self._device = device
+        self._vao = device.context.vertex_array(program.glo, [])
+
+    def draw(self, first_row: int, rows: int, width: int) -> None:
+        """Run over some rows of the target."""
+        raw = self._device.raw
+        raw.glDisable(gl.DEPTH_TEST)
+        raw.glDisable(gl.CULL_FACE)
+        raw.glEnable(gl.SCISSOR_TEST)
+        raw.glScissor(0, first_row, width, rows)
+        self._vao.render(self._device.triangles_mode, vertices=3)
+        raw.glDisable(gl.SCISSOR_TEST)
+
+    def release(self) -> None:
+        """Free the vertex array."""
+        self._vao.release()

@@ -1,0 +1,44 @@
+"""Encoding: scene-linear light → 8-bit sRGB."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lfd_render.gpu import raw as gl
+from lfd_render.gpu.device import Device
+from lfd_render.gpu.framebuffer import LayerTarget
+from lfd_render.gpu.memory import TextureArray
+from lfd_render.passes.screen import ScreenPass
+
+
+class Encode:
+    """Linear texture layer → uint8 picture: exposure, Khronos PBR Neutral tone curve, sRGB."""
+
+    def __init__(self, device: Device, width: int, height: int) -> None:
+        self._pass = ScreenPass(device, "encode/encode.frag")
+        self._picture = TextureArray(device, "picture", (width, height, 1), gl.RGBA8)
+        self._framebuffer = LayerTarget(device, self._picture, depth=False)
+
+    def __call__(self, linear: TextureArray, layer: int, exposure: float) -> None:
+        """Encode one layer of a texture of the picture's size."""
+        width, height = self._picture.width, self._picture.height
+        self._framebuffer.use(0)
+        self._pass(
+            {},
+            {"exposure": exposure, "layer": layer},
+            {"linear_image": linear},
+            (0, height),
+            width,
+        )
+
+    def read(self) -> NDArray[np.uint8]:
+        """The picture as uint8 [y, x, 3], top row first."""
+        self._framebuffer.use(0)
+        return self._framebuffer.read_rgb(gl.UNSIGNED_BYTE, np.uint8).astype(np.uint8, copy=False)
+
+    def release(self) -> None:
+        """Free everything."""
+        self._framebuffer.release()
+        self._picture.release()
+        self._pass.release()

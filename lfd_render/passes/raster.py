@@ -1,0 +1,152 @@
+"""Hardware rasterisation of one view: the baseline's pass, and the independent eye of the tests."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lfd_render.display import Rig, ViewGrid
+from lfd_render.gpu import raw as gl
+from lfd_render.gpu.device import Device
+from lfd_render.gpu.framebuffer import IndexedDraws, LayerTarget
+from lfd_render.gpu.memory import Buffer
+from lfd_render.gpu.programs import RasterProgram
+from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
+from lfd_render.passes.shade import gl_matrix
+from lfd_render.passes.view_target import Band, ViewTarget
+
+
+class RasterForward:
+    """SceneBuffers, one eye → one layer of ViewTarget.images: every fragment shaded as it comes."""
+
+    def __init__(self, device: Device, scene: SceneBuffers, target: ViewTarget) -> None:
+        self._device = device
+        self._scene = scene
+        self._target = target
+        self._layer = LayerTarget(device, target.images, depth=True)
+        self._programs = {
+            alpha_tested: RasterProgram(
+                device,
+                "raster/forward.vert",
+                "raster/forward.frag",
+                {"ALPHA_TESTED": int(alpha_tested), **scene.constants()},
+            )
+            for alpha_tested in sorted({batch.alpha_tested for batch in scene.batches})
+        }
+        self._indices: list[Buffer] = []
+        self._draws: list[IndexedDraws] = []
+        for batch in scene.batches:
+            corners = batch.corners.read(np.uint32).reshape(-1, 4)[:, :3]
+            self._indices.append(Buffer.of(device, "indices", corners))
+            program = self._programs[batch.alpha_tested]
+            self._draws.append(IndexedDraws(device, program, self._indices[-1]))
+
+    def __call__(
+        self,
+        view: int,
+        band: Band,
+        world_from_display: NDArray[np.float64],
+        background: tuple[float, float, float],
+    ) -> None:
+        """Render one view's rows of a band, row 0 of the layer on top."""
+        rig = self._target.rig
+        raw = self._device.raw
+        eye_mm = float(rig.eye_x_mm[view])
+        eye_world = world_from_display @ np.array([eye_mm, 0.0, rig.distance_mm, 1.0])
+        clip = band_clip_from_display(rig, self._target.grid, band, view)
+        self._layer.use(view)
+        self._layer.clear((*background, 0.0))
+        raw.glEnable(gl.DEPTH_TEST)
+        raw.glDepthFunc(gl.LESS)
+        raw.glEnable(gl.CLIP_DISTANCE0)
+        raw.glEnable(gl.CLIP_DISTANCE0 + 1)
+        raw.glCullFace(gl.BACK)
+        for batch, draws in zip(self._scene.batches, self._draws, strict=True):
+            self._draw_batch(
+                batch,
+                draws,
+                band,
+                {
+                    "clip_from_display": gl_matrix(clip),
+                    "world_from_display": gl_matrix(world_from_display),
+                    "eye_mm": eye_mm,
+                    "eye_world": tuple(eye_world[:3]),
+                },
+                view,
+            )
+        raw.glDisable(gl.CLIP_DISTANCE0)
+        raw.glDisable(gl.CLIP_DISTANCE0 + 1)
+        raw.glDisable(gl.CULL_FACE)
+        raw.glDisable(gl.DEPTH_TEST)
+
+    def _draw_batch(
+        self,
+        batch: Batch,
+        draws: IndexedDraws,
+        band: Band,
+        camera: dict[str, bytes | float | tuple[float, ...]],
+        view: int,
+    ) -> None:
+        """Draw a batch's runs: sides culled as each run's materials and placements ask."""
+        raw = self._device.raw
+        buffers = {
+            "DisplayPositions": batch.display_positions,
+            "LocalPositions": batch.local_positions,
+            "Draws": self._scene.draws,
+            "Vertices": batch.vertex_data,
+            "FrameBlock": self._target.frame(band, batch),
+            **self._scene.materials_of(),
+        }
+        textures = self._scene.textures
+        samplers = {"srgb_maps": textures.srgb, "linear_maps": textures.linear}
+        per_view = {"view": view} if batch.alpha_tested else {}
+        for run in self._scene.runs(batch):
+            self._programs[batch.alpha_tested].set(
+                buffers, {**camera, **per_view, "facing_sign": -1 if run.mirrored else 1}, samplers
+            )
+            (raw.glDisable if run.double_sided else raw.glEnable)(gl.CULL_FACE)
+            # Row 0 at the raster's bottom turns windings over.
+            raw.glFrontFace(gl.CCW if run.mirrored else gl.CW)
+            draws.draw(run.first, run.count)
+
+    def release(self) -> None:
+        """Free everything but the target."""
+        for draws in self._draws:
+            draws.release()
+        for buffer in self._indices:
+            buffer.release()
+        for program in self._programs.values():
+            program.release()
+        self._layer.release()
+
+
+def band_clip_from_display(
+    rig: Rig, grid: ViewGrid, band: Band, view: int
+) -> NDArray[np.float64]:
+    """clip_from_display, float64 [4, 4], of one view's band: column c of row r has its centre at the
+    raster's (c + ½, r − band.first + ½), row 0 at the bottom.
+
+    column·d = D·X/column_mm + (d − D)·eye + offset·d, with an offset linear in the row (`upright` or
+    `sheared` grids), and row·d = (h/2·d − D·Y)/row_mm; d = D − Z; depth d − 2·near.
+    """
+    distance = rig.distance_mm
+    height = rig.panel_mm[1]
+    eye = rig.eye_x_mm[view] / grid.column_mm
+    row_mm = height / grid.rows
+    slope = float(grid.row_offset[1] - grid.row_offset[0]) if grid.rows > 1 else 0.0
+    start = float(grid.row_offset[0]) - 0.5 * slope
+    assert np.allclose(grid.row_offset, start + slope * (np.arange(grid.rows) + 0.5), atol=1e-6)
+
+    depth = np.array([0.0, 0.0, -1.0, distance])
+    row = 0.5 * height / row_mm * depth + np.array([0.0, -distance / row_mm, 0.0, 0.0])
+    column = (
+        np.array([distance / grid.column_mm, 0.0, -eye, 0.0]) + start * depth + slope * row
+    )
+    return np.stack(
+        [
+            2.0 / grid.columns * column - depth,
+            2.0 / band.rows * (row - band.first * depth) - depth,
+            depth + np.array([0.0, 0.0, 0.0, -2.0 * rig.near_mm]),
+            depth,
+        ]
+    )

@@ -1,0 +1,111 @@
+"""Splatting: points → the winning triangle of each view pixel."""
+
+from __future__ import annotations
+
+from lfd_render.gpu.device import Device
+from lfd_render.gpu.layout import CONSTANTS
+from lfd_render.gpu.memory import Buffer
+from lfd_render.gpu.programs import Kernel
+from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
+from lfd_render.passes.sample import GROUP_ITEMS, GROUPS_ACROSS, PointCloud
+from lfd_render.passes.view_target import Band, ViewTarget
+
+_FARTHEST = 0x7F800000  # +∞ as a float's bits
+_DEPTH, _WINNER = 0, 1
+
+
+def view_lanes(views: int) -> int:
+    """Views that a work group takes side by side: a multiple of 8, at most 64."""
+    return min(64, -(-views // 8) * 8)
+
+
+class ViewBuffers:
+    """The winner of each view pixel of a band, [row of the band, view, column]: depths as float bits,
+    words as global triangle ids or NO_TRIANGLE."""
+
+    def __init__(self, device: Device, target: ViewTarget) -> None:
+        self.depths = Buffer(device, "view buffers", 4 * target.band_pixels)
+        self.words = Buffer(device, "view buffers", 4 * target.band_pixels)
+
+    def clear(self) -> None:
+        """Set all pixels to nothing, infinitely far."""
+        self.depths.fill(_FARTHEST)
+        self.words.fill(CONSTANTS["NO_TRIANGLE"])
+
+    def release(self) -> None:
+        """Free the buffers."""
+        self.depths.release()
+        self.words.release()
+
+
+class Splat:
+    """PointCloud, ViewTarget → ViewBuffers. Nearest depth wins; at equal depth the smaller id.
+
+    Two passes of 32-bit atomics over all batches, the portable path: first `depths`, then
+    `winners`. The result depends neither on the order of points nor on batches.
+    """
+
+    def __init__(self, device: Device, scene: SceneBuffers, view_lanes: int) -> None:
+        constants = {
+            "VIEW_LANES": view_lanes,
+            "GROUP_ITEMS": GROUP_ITEMS,
+            "GROUPS_ACROSS": GROUPS_ACROSS,
+            **scene.constants(),
+        }
+        self._scene = scene
+        self._kernels = {
+            (step, alpha_tested): Kernel(
+                device,
+                "splat/shear.comp",
+                {**constants, "STEP": step, "ALPHA_TESTED": int(alpha_tested)},
+            )
+            for alpha_tested in sorted({batch.alpha_tested for batch in scene.batches})
+            for step in (_DEPTH, _WINNER)
+        }
+
+    def depths(
+        self, batch: Batch, points: PointCloud, target: ViewTarget, band: Band, views: ViewBuffers
+    ) -> None:
+        """Lower each pixel's depth to this batch's nearest."""
+        self._run(_DEPTH, batch, points, target, band, views)
+
+    def winners(
+        self, batch: Batch, points: PointCloud, target: ViewTarget, band: Band, views: ViewBuffers
+    ) -> None:
+        """Set each pixel's word to the smallest id at its depth. All batches' depths come first."""
+        self._run(_WINNER, batch, points, target, band, views)
+
+    def _run(
+        self,
+        step: int,
+        batch: Batch,
+        points: PointCloud,
+        target: ViewTarget,
+        band: Band,
+        views: ViewBuffers,
+    ) -> None:
+        kernel = self._kernels[step, batch.alpha_tested]
+        kernel.set(
+            {
+                **batch.geometry(),
+                **points.blocks(),
+                **self._scene.materials_of(),
+                "Draws": self._scene.draws,
+                "Vertices": batch.vertex_data,
+                "FrameBlock": target.frame(band, batch),
+                "Eyes": target.eyes,
+                "RowOffsets": target.row_offsets,
+                "Depths": views.depths,
+                "Words": views.words,
+            },
+            samplers={
+                "srgb_maps": self._scene.textures.srgb,
+                "linear_maps": self._scene.textures.linear,
+            },
+        )
+        kernel.run_indirect(points.work)
+
+    def release(self) -> None:
+        """Free the kernels."""
+        for kernel in self._kernels.values():
+            kernel.release()

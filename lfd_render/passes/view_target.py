@@ -1,0 +1,102 @@
+"""Where views are rendered: rig and grid on the device, in bands of rows that fit its buffers.
+
+Rows are independent of each other in every pass, so a view set of any size is rendered in bands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lfd_render.display import Rig, ViewGrid
+from lfd_render.errors import ResourceError
+from lfd_render.gpu import raw as gl
+from lfd_render.gpu.device import Device
+from lfd_render.gpu.layout import dtype
+from lfd_render.gpu.memory import Buffer, TextureArray
+from lfd_render.gpu.scene_buffers import Batch
+
+BAND_BYTES = 96 << 20  # of one 32-bit word a view pixel; llvmpipe allows 128 MiB a buffer
+MOST_BAND_ROWS = 1000  # with at most 4 Mi triangles a batch, items stay below 2³²
+
+
+@dataclass(frozen=True)
+class Band:
+    """Rows [first, first + rows) of the views."""
+
+    first: int
+    rows: int
+
+
+class ViewTarget:
+    """Rig, grid and bands, with the view images [view, row of the band, column] in linear light."""
+
+    def __init__(
+        self, device: Device, rig: Rig, grid: ViewGrid, batches: Sequence[Batch], seed: int = 0
+    ) -> None:
+        self.rig = rig
+        self.grid = grid
+        row_bytes = 4 * rig.views * grid.columns
+        band_rows = min(grid.rows, MOST_BAND_ROWS, BAND_BYTES // row_bytes)
+        if band_rows < 1 or max(grid.rows, grid.columns) >= 1 << 16:
+            raise ResourceError(
+                f"views: {rig.views} views of {grid.columns}×{grid.rows} do not fit the device; "
+                "use fewer or smaller views"
+            )
+        self.bands = [
+            Band(first, min(band_rows, grid.rows - first))
+            for first in range(0, grid.rows, band_rows)
+        ]
+        self.band_pixels = band_rows * rig.views * grid.columns
+        self.eyes = Buffer.of(
+            device, "rig", (rig.eye_x_mm / grid.column_mm).astype(np.float32)
+        )
+        self.row_offsets = Buffer.of(device, "rig", grid.row_offset.astype(np.float32))
+        self.images = TextureArray(
+            device, "view images", (grid.columns, band_rows, rig.views), gl.RGBA16F
+        )
+        self.images.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
+        # One row suffices to have a device compile all that a frame will run.
+        self.warm_up_band = Band(grid.rows // 2, 1)
+        self._frames = {
+            (band, batch.triangle_base): Buffer.of(
+                device, "frame", _frame_record(rig, grid, band, batch, seed)
+            )
+            for band in {*self.bands, self.warm_up_band}
+            for batch in batches
+        }
+
+    def frame(self, band: Band, batch: Batch) -> Buffer:
+        """The Frame block of a band and a batch."""
+        return self._frames[band, batch.triangle_base]
+
+    def band_frame(self, band: Band) -> Buffer:
+        """A Frame block of a band, for passes that read no triangles."""
+        return self._frames[band, 0]
+
+    def release(self) -> None:
+        """Free everything."""
+        for buffer in (self.eyes, self.row_offsets, *self._frames.values()):
+            buffer.release()
+        self.images.release()
+
+
+def _frame_record(
+    rig: Rig, grid: ViewGrid, band: Band, batch: Batch, seed: int
+) -> np.ndarray[tuple[int], np.dtype[np.void]]:
+    record = np.zeros(1, dtype("Frame"))
+    width, height = rig.panel_mm
+    record["distance_mm"] = rig.distance_mm
+    record["near_mm"] = rig.near_mm
+    record["panel_width_mm"], record["panel_height_mm"] = width, height
+    record["column_mm"] = grid.column_mm
+    record["row_mm"] = height / grid.rows
+    record["eye_first"] = rig.eye_x_mm[0] / grid.column_mm
+    record["eye_last"] = rig.eye_x_mm[-1] / grid.column_mm
+    record["columns"], record["rows"], record["views"] = grid.columns, grid.rows, rig.views
+    record["band_first"], record["band_rows"] = band.first, band.rows
+    record["triangles"], record["triangle_base"] = batch.triangles, batch.triangle_base
+    record["seed"] = seed & 0xFFFFFFFF
+    return record

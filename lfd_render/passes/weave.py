@@ -1,0 +1,106 @@
+"""Weaving: view images → the panel image, by the profile's phase tables."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lfd_render.display import DisplayProfile, ViewGrid
+from lfd_render.gpu import raw as gl
+from lfd_render.gpu.device import Device
+from lfd_render.gpu.framebuffer import LayerTarget
+from lfd_render.gpu.memory import Buffer, TextureArray
+from lfd_render.passes.screen import ScreenPass
+from lfd_render.passes.view_target import Band, ViewTarget
+
+
+class Weave:
+    """ViewTarget.images → panel image [y, x, RGBA] in scene-linear half float, row 0 on top.
+
+    Each subpixel takes the nearest view at the centre of its lens on its row: the lens's own column
+    where views follow the lenses, linear between two columns where they stand upright.
+    """
+
+    def __init__(self, device: Device, profile: DisplayProfile, grid: ViewGrid, views: int) -> None:
+        self._profile = profile
+        self._grid = grid
+        self._pass = ScreenPass(
+            device, "weave/weave.frag", {"LINEAR_COLUMNS": int(grid.kind == "upright")}
+        )
+        tables = profile.phase_tables()
+        self._pattern_mode = tables.pattern_mode
+        self._buffers = {
+            "ColumnPhases": _phase_buffer(device, tables.column, views),
+            "RowPhases": _phase_buffer(device, tables.row, views),
+            "CellPhases": _phase_buffer(device, tables.cell, views),
+        }
+        self._columns_per_lens, row_columns = lens_columns(profile, grid)
+        self._buffers["RowColumns"] = Buffer.of(device, "weave", row_columns.astype(np.float32))
+        width, height = profile.resolution_px
+        self.panel = TextureArray(device, "panel image", (width, height, 1), gl.RGBA16F)
+        self.framebuffer = LayerTarget(device, self.panel, depth=False)
+
+    def __call__(self, target: ViewTarget, band: Band) -> None:
+        """Weave the panel rows that show this band."""
+        width, height = self._profile.resolution_px
+        first, end = (-(-row * height // self._grid.rows) for row in (band.first, band.first + band.rows))
+        self.framebuffer.use(0)
+        self._pass(
+            {**self._buffers, "FrameBlock": target.band_frame(band)},
+            {
+                "columns_per_lens": self._columns_per_lens,
+                "panel_px": (width, height),
+                "pattern_mode": self._pattern_mode,
+            },
+            {"view_images": target.images},
+            (first, end),
+            width,
+        )
+
+    def read_linear(self) -> NDArray[np.float16]:
+        """The panel image as float16 [y, x, 3]."""
+        self.framebuffer.use(0)
+        return self.framebuffer.read_rgb(gl.HALF_FLOAT, np.float16).astype(np.float16, copy=False)
+
+    def release(self) -> None:
+        """Free everything."""
+        for buffer in self._buffers.values():
+            buffer.release()
+        self.framebuffer.release()
+        self.panel.release()
+        self._pass.release()
+
+
+def lens_columns(
+    profile: DisplayProfile, grid: ViewGrid
+) -> tuple[float, NDArray[np.float64]]:
+    """Where lens k appears in a view: column position = k·columns_per_lens + row_columns[panel y].
+
+    Returns columns_per_lens and row_columns, float64 [panel height]. Lens-aligned: lens k is column
+    k − row_base. Upright: the lens centre at u = (k + ½ + center)/P − v·T (displays, section 1).
+    """
+    height = profile.resolution_px[1]
+    y = np.arange(height)
+    if grid.kind == "lens":
+        view_row = np.minimum(y * grid.rows // height, grid.rows - 1)
+        return 1.0, 0.5 - grid.row_base[view_row]
+    v = (height - y - 0.5) / height
+    count = profile.lens_count
+    offsets = (0.5 + profile.center) / count - v * profile.drift
+    return grid.columns / count, grid.columns * offsets
+
+
+def phase_words(phases: NDArray[np.float64], views: int) -> NDArray[np.uint32]:
+    """Phases in lenses → [..., 2] words: whole views (two's complement) and 2⁻³² fractions of one."""
+    in_views = phases * views
+    whole = np.floor(in_views)
+    fraction = np.rint((in_views - whole) * 2.0**32).astype(np.uint64)
+    carry = fraction >> np.uint64(32)
+    whole_words = (whole.astype(np.int64) + carry.astype(np.int64)).astype(np.int32)
+    return np.stack(
+        [whole_words.view(np.uint32), fraction.astype(np.uint32)], axis=-1
+    )
+
+
+def _phase_buffer(device: Device, phases: NDArray[np.float64], views: int) -> Buffer:
+    return Buffer.of(device, "weave", phase_words(phases, views))

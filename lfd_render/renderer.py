@@ -1,0 +1,338 @@
+"""The renderer: one device, any scene, any display."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lfd_render.display import Camera, DisplayProfile, Rig, ViewGrid
+from lfd_render.errors import SceneError, UsageError
+from lfd_render.gpu.clock import StageClock
+from lfd_render.gpu.device import Device
+from lfd_render.gpu.scene_buffers import SceneBuffers
+from lfd_render.panel.eia import Eia
+from lfd_render.passes.encode import Encode
+from lfd_render.passes.view_target import ViewTarget
+from lfd_render.passes.weave import Weave
+from lfd_render.scene import Scene
+from lfd_render.techniques import Lfdpr, Mvr, Placement, Technique
+
+REPEAT_TURN_RAD = np.deg2rad(0.5)  # how far the scene turns between repeated frames
+TECHNIQUES = ("lfdpr", "mvr")
+PRESETS = ("default", "paper")
+
+
+@dataclass(frozen=True)
+class RenderOptions:
+    """How to render. view_size: upright views of (width, height); None: views that follow the
+    lenses, with as many rows as makes all views together as large as the panel."""
+
+    views: int | None = None
+    view_size: tuple[int, int] | None = None
+    technique: str = "lfdpr"
+    preset: str = "default"
+    spacing: str | None = None
+    seed: int = 0
+    repeat: int = 1
+    background: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    exposure: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check ranges; raises UsageError."""
+        if self.technique not in TECHNIQUES:
+            raise UsageError(f"technique '{self.technique}': unknown; use {' or '.join(TECHNIQUES)}")
+        if self.preset not in PRESETS:
+            raise UsageError(f"preset '{self.preset}': unknown; use {' or '.join(PRESETS)}")
+        if self.views is not None and not 1 <= self.views <= 1024:
+            raise UsageError(f"views: {self.views} is out of range; use 1 to 1024")
+        if self.view_size is not None and not all(1 <= n <= 16384 for n in self.view_size):
+            raise UsageError(f"view size: {self.view_size} is out of range; use 1 to 16384 a side")
+        if self.repeat < 1:
+            raise UsageError(f"repeat: {self.repeat} is out of range; use 1 or more")
+        if not 0.0 < self.exposure < np.inf:
+            raise UsageError(f"exposure: {self.exposure} is out of range; use a positive number")
+
+
+@dataclass
+class _Timings:
+    """Milliseconds of one call: what is done once, and each frame's stages and whole."""
+
+    once: dict[str, float] = field(default_factory=dict)
+    frames: list[tuple[float, dict[str, float]]] = field(default_factory=list)
+
+    def measure(self, name: str, device: Device, work: Callable[[], Any]) -> Any:
+        """Run something once, timed to an idle device."""
+        start = time.perf_counter()
+        result = work()
+        device.finish()
+        self.once[name] = self.once.get(name, 0.0) + 1000.0 * (time.perf_counter() - start)
+        return result
+
+    def summary(self) -> dict[str, float]:
+        """The median frame's whole and stages beside what was done once, in ms."""
+        order = sorted(self.frames, key=lambda frame: frame[0])
+        stages = order[(len(order) - 1) // 2][1] if order else {}
+        frame = {"frame": statistics.median(f[0] for f in order)} if order else {}
+        return {key: round(ms, 3) for key, ms in {**self.once, **stages, **frame}.items()}
+
+
+class Renderer:
+    """Renders EIAs and views. It holds one GL context, which belongs to the thread that made it.
+
+    device: ``auto``, ``gpu``, ``software`` or an EGL index. Raises GpuError without OpenGL 4.5.
+    The scene of the last call stays uploaded, so that rendering it again is quick.
+    """
+
+    def __init__(self, device: str = "auto") -> None:
+        self.device = Device.open(device)
+        self._scene: Scene | None = None
+        self._buffers: SceneBuffers | None = None
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the scene and the context."""
+        self._drop_scene()
+        self.device.close()
+
+    def render(
+        self,
+        scene: Scene,
+        display: DisplayProfile,
+        camera: Camera | None = None,
+        views: int | None = None,
+        **options: Any,
+    ) -> Eia:
+        """Render a scene into the panel image of a display.
+
+        camera: where the display's window stands in the world; None uses the scene's own or frames
+        it. views: number of views, the profile's by default. options: those of RenderOptions.
+        Raises SceneError, UsageError, ResourceError or GpuError.
+        """
+        choice = RenderOptions(views=views, **options)
+        camera = camera or camera_for(scene, display)
+        rig = display.rig(choice.views, choice.spacing)  # type: ignore[arg-type]  # rig() checks it
+        grid = _grid(display, choice, rig.views)
+        _check_in_front(scene, camera, rig)
+        timings = _Timings()
+        buffers = self._upload(scene, timings)
+
+        def compile_all() -> tuple[Technique, Weave, Encode]:
+            technique = self._technique(buffers, rig, grid, choice)
+            weave = Weave(self.device, display, grid, rig.views)
+            encode = Encode(self.device, *display.resolution_px)
+            self._warm_up(technique, weave, encode, camera, choice)
+            return technique, weave, encode
+
+        technique, weave, encode = timings.measure("compile", self.device, compile_all)
+        try:
+            for index in range(choice.repeat):
+                turned = camera.turned((index - choice.repeat + 1) * float(REPEAT_TURN_RAD))
+                placement = Placement(
+                    turned.display_from_world(display.size_mm), choice.background
+                )
+                self._frame(technique, weave, encode, placement, choice.exposure, timings)
+            linear, pixels = timings.measure(
+                "read", self.device, lambda: (weave.read_linear(), encode.read())
+            )
+            report = {
+                **self._report(technique, scene, buffers, rig, grid, choice),
+                "camera": camera.to_json_dict(),
+                "timings_ms": timings.summary(),
+            }
+            self.device.check()
+        finally:
+            for owner in (technique, weave, encode):
+                owner.release()
+        metadata = {
+            "lfd:profile": display.name,
+            "lfd:profile-hash": display.hash,
+            "lfd:views": str(rig.views),
+            "lfd:technique": choice.technique,
+            "lfd:seed": str(choice.seed),
+        }
+        return Eia(pixels, linear, report, metadata)
+
+    def views(
+        self,
+        scene: Scene,
+        display: DisplayProfile,
+        camera: Camera | None = None,
+        views: int | None = None,
+        rig: Rig | None = None,
+        **options: Any,
+    ) -> NDArray[np.uint8]:
+        """Render single upright views, uint8 [view, y, x, 3], view 0 leftmost.
+
+        rig: eyes other than the display's own, for example `Rig.single(display, angle)`. The view
+        size is by default one column a lens and the default rows. Otherwise as `render`.
+        """
+        choice = RenderOptions(views=views, **options)
+        camera = camera or camera_for(scene, display)
+        rig = rig or display.rig(choice.views, choice.spacing)  # type: ignore[arg-type]  # checked there
+        width, height = choice.view_size or upright_size(display, display.views)
+        grid = ViewGrid.upright(display, width, height)
+        _check_in_front(scene, camera, rig)
+        buffers = self._upload(scene, _Timings())
+        technique = self._technique(buffers, rig, grid, choice)
+        encode = Encode(self.device, grid.columns, technique.target.images.height)
+        pictures = np.empty((rig.views, grid.rows, grid.columns, 3), np.uint8)
+        clock = StageClock(self.device)
+        try:
+            technique.begin(
+                Placement(camera.display_from_world(display.size_mm), choice.background), clock
+            )
+            for band in technique.target.bands:
+                technique.render(band, clock)
+                for view in range(rig.views):
+                    encode(technique.target.images, view, choice.exposure)
+                    rows = slice(band.first, band.first + band.rows)
+                    pictures[view, rows] = encode.read()[: band.rows]
+            self.device.check()
+        finally:
+            technique.release()
+            encode.release()
+        return pictures
+
+    def _upload(self, scene: Scene, timings: _Timings) -> SceneBuffers:
+        if self._buffers is None or self._scene is not scene:
+            self._drop_scene()
+            self._buffers = timings.measure(
+                "upload", self.device, lambda: SceneBuffers(self.device, scene)
+            )
+            self._scene = scene
+        assert self._buffers is not None
+        return self._buffers
+
+    def _drop_scene(self) -> None:
+        if self._buffers is not None:
+            self._buffers.release()
+            self._buffers = self._scene = None
+
+    def _technique(
+        self, buffers: SceneBuffers, rig: Rig, grid: ViewGrid, choice: RenderOptions
+    ) -> Technique:
+        target = ViewTarget(self.device, rig, grid, buffers.batches, choice.seed)
+        if choice.technique == "mvr":
+            return Mvr(self.device, buffers, target)
+        return Lfdpr(
+            self.device, buffers, target, stochastic_culling=choice.preset == "paper"
+        )
+
+    def _warm_up(
+        self,
+        technique: Technique,
+        weave: Weave,
+        encode: Encode,
+        camera: Camera,
+        choice: RenderOptions,
+    ) -> None:
+        """Run one row of everything: a software device compiles shaders when they first run."""
+        clock = StageClock(self.device)
+        band = technique.target.warm_up_band
+        panel_mm = technique.target.rig.panel_mm
+        technique.begin(Placement(camera.display_from_world(panel_mm), choice.background), clock)
+        technique.render(band, clock)
+        weave(technique.target, band)
+        encode(weave.panel, 0, choice.exposure)
+
+    def _frame(
+        self,
+        technique: Technique,
+        weave: Weave,
+        encode: Encode,
+        placement: Placement,
+        exposure: float,
+        timings: _Timings,
+    ) -> None:
+        """One frame, from camera to encoded panel image."""
+        clock = StageClock(self.device)
+        self.device.finish()
+        start = time.perf_counter()
+        technique.begin(placement, clock)
+        for band in technique.target.bands:
+            technique.render(band, clock)
+            with clock.stage("weave"):
+                weave(technique.target, band)
+        with clock.stage("encode_srgb"):
+            encode(weave.panel, 0, exposure)
+        self.device.finish()
+        timings.frames.append((1000.0 * (time.perf_counter() - start), clock.stages_ms))
+
+    def _report(
+        self,
+        technique: Technique,
+        scene: Scene,
+        buffers: SceneBuffers,
+        rig: Rig,
+        grid: ViewGrid,
+        choice: RenderOptions,
+    ) -> dict[str, Any]:
+        return {
+            "technique": choice.technique,
+            "preset": choice.preset,
+            "views": rig.views,
+            "view_size": [grid.columns, grid.rows],
+            "view_grid": grid.kind,
+            "triangles": scene.triangle_count,
+            "points": technique.count_points(),
+            "renderer": self.device.name,
+            "device_bytes": self.device.ledger.peak,
+            "warnings": list(buffers.warnings),
+        }
+
+
+def camera_for(scene: Scene, display: DisplayProfile) -> Camera:
+    """The scene's own window, or one that frames it in the display's comfortable depth."""
+    if scene.default_camera is not None:
+        return Camera.from_json_dict(dict(scene.default_camera), scene.name)
+    return Camera.frame(*scene.bounds(), display)
+
+
+def upright_size(display: DisplayProfile, views: int) -> tuple[int, int]:
+    """Width and height of upright views: one column a lens, all views together as large as the
+    panel."""
+    rows = ViewGrid.default_rows(display, views)
+    width, height = display.resolution_px
+    return max(1, round(width * height / (views * rows))), rows
+
+
+def _grid(display: DisplayProfile, choice: RenderOptions, views: int) -> ViewGrid:
+    if choice.view_size is not None:
+        return ViewGrid.upright(display, *choice.view_size)
+    rows = ViewGrid.default_rows(display, views)
+    if choice.preset == "paper":
+        return ViewGrid.upright(display, *upright_size(display, views))
+    return (ViewGrid.sheared if choice.technique == "mvr" else ViewGrid.lens)(display, rows)
+
+
+def _check_in_front(scene: Scene, camera: Camera, rig: Rig) -> None:
+    """Raise SceneError when nothing of the scene's box lies in front of the eyes."""
+    low, high = scene.bounds()
+    corners = np.array(
+        [[(low, high)[i][0], (low, high)[j][1], (low, high)[k][2], 1.0]
+         for i in (0, 1) for j in (0, 1) for k in (0, 1)]
+    )  # fmt: skip
+    depths = rig.distance_mm - (corners @ camera.display_from_world(rig.panel_mm).T)[:, 2]
+    if depths.max() <= rig.near_mm:
+        raise SceneError(
+            f"scene '{scene.name}': all of it lies behind the viewer; camera target "
+            f"{list(camera.target)} with eye_direction {list(camera.eye_direction)} looks away, "
+            "so turn eye_direction round or move the target"
+        )

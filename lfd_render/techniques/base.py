@@ -1,0 +1,44 @@
+"""What every technique is: passes in order over a view target, each a named stage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lfd_render.gpu.clock import StageClock
+from lfd_render.passes.view_target import Band, ViewTarget
+
+
+@dataclass(frozen=True)
+class Placement:
+    """One frame's camera. display_from_world: float64 [4, 4]; background: linear RGB."""
+
+    display_from_world: NDArray[np.float64]
+    background: tuple[float, float, float]
+
+    @property
+    def world_from_display(self) -> NDArray[np.float64]:
+        """The inverse, float64 [4, 4]."""
+        return np.linalg.inv(self.display_from_world)
+
+
+class Technique(Protocol):
+    """Fills view images, band by band."""
+
+    target: ViewTarget
+
+    def begin(self, placement: Placement, clock: StageClock) -> None:
+        """Start a frame: place the scene."""
+
+    def render(self, band: Band, clock: StageClock) -> None:
+        """Fill target.images with one band."""
+
+    def count_points(self) -> int:
+        """Points of a whole frame at the last placement; 0 where there are none."""
+        ...
+
+    def release(self) -> None:
+        """Free what the technique owns, its target included."""

@@ -1,0 +1,80 @@
+"""Light field display point rendering (Gavane and Watson 2024), generated in compute."""
+
+from __future__ import annotations
+
+from lfd_render.gpu.clock import StageClock
+from lfd_render.gpu.device import Device
+from lfd_render.gpu.scene_buffers import SceneBuffers
+from lfd_render.passes.sample import Sample
+from lfd_render.passes.shade import Shade
+from lfd_render.passes.splat import Splat, ViewBuffers, view_lanes
+from lfd_render.passes.transform import Transform
+from lfd_render.passes.view_target import Band, ViewTarget
+from lfd_render.techniques.base import Placement
+
+
+class Lfdpr:
+    """transform → sample → splat (depths, winners) → shade."""
+
+    def __init__(
+        self,
+        device: Device,
+        scene: SceneBuffers,
+        target: ViewTarget,
+        *,
+        stochastic_culling: bool = False,
+    ) -> None:
+        lanes = view_lanes(target.rig.views)
+        self.target = target
+        self._scene = scene
+        self._transform = Transform(device)
+        self._sample = Sample(device, lanes, stochastic_culling=stochastic_culling)
+        self._splat = Splat(device, scene, lanes)
+        self._shade = Shade(device, scene)
+        self._points = [self._sample.allocate(batch) for batch in scene.batches]
+        self._views = ViewBuffers(device, target)
+
+    def begin(self, placement: Placement, clock: StageClock) -> None:
+        """Place the scene and transform its vertices."""
+        self._placement = placement
+        with clock.stage("transform"):
+            self._scene.place(placement.display_from_world)
+            for batch in self._scene.batches:
+                self._transform(self._scene, batch)
+
+    def render(self, band: Band, clock: StageClock) -> None:
+        """Sample, splat and shade one band of rows."""
+        batches = list(zip(self._scene.batches, self._points, strict=True))
+        with clock.stage("sample"):
+            for batch, points in batches:
+                self._sample(self._scene, batch, self.target, band, points)
+        with clock.stage("splat"):
+            self._views.clear()
+            for batch, points in batches:
+                self._splat.depths(batch, points, self.target, band, self._views)
+            for batch, points in batches:
+                self._splat.winners(batch, points, self.target, band, self._views)
+        with clock.stage("shade"):
+            self._shade(
+                self.target,
+                band,
+                self._views,
+                self._placement.world_from_display,
+                self._placement.background,
+            )
+
+    def count_points(self) -> int:
+        """Points of all bands at the last placement. Samples again, outside any timing."""
+        return sum(
+            self._sample.count(self._scene, batch, self.target, band, points)
+            for band in self.target.bands
+            for batch, points in zip(self._scene.batches, self._points, strict=True)
+        )
+
+    def release(self) -> None:
+        """Free passes, points and view buffers."""
+        for owner in (
+            self._transform, self._sample, self._splat, self._shade, self._views, self.target,
+            *self._points,
+        ):  # fmt: skip
+            owner.release()

@@ -1,0 +1,44 @@
+// Multi-view rendering, one pass a view: a vertex through one view's off-axis frustum.
+// In: DisplayPositions, Vertices, LocalPositions (draw index). The window's sides clip, since the
+// raster is a parallelogram around the window when views follow the lenses.
+
+#include "common/frame.glsl"
+#include "common/vertices.glsl"
+#include "layout/Draw"
+
+layout(std430) readonly restrict buffer DisplayPositions { vec4 display_positions[]; };
+layout(std430) readonly restrict buffer LocalPositions { vec4 local_positions[]; };
+layout(std430) readonly restrict buffer Draws { Draw draws[]; };
+
+uniform mat4 clip_from_display;
+uniform mat4 world_from_display;
+uniform float eye_mm;
+
+out vec3 p_world;
+out vec3 normal_world;
+out vec4 uv01;
+out vec4 color;
+flat out uint material_index;
+
+out gl_PerVertex {
+    vec4 gl_Position;
+    float gl_ClipDistance[2];
+};
+
+void main() {
+    vec4 p_display = vec4(display_positions[gl_VertexID].xyz, 1.0);
+    Vertex vertex = vertices[gl_VertexID];
+    Draw draw = draws[floatBitsToUint(local_positions[gl_VertexID].w)];
+
+    gl_Position = clip_from_display * p_display;
+    float d = frame.distance_mm - p_display.z;
+    float x_times_d = frame.distance_mm * p_display.x - p_display.z * eye_mm;
+    gl_ClipDistance[0] = x_times_d + 0.5 * frame.panel_width_mm * d;
+    gl_ClipDistance[1] = 0.5 * frame.panel_width_mm * d - x_times_d;
+
+    p_world = (world_from_display * p_display).xyz;
+    normal_world = mat3(draw.normal_matrix_x.xyz, draw.normal_matrix_y.xyz, draw.normal_matrix_z.xyz) * vertex_normal(vertex);
+    uv01 = vec4(vertex.uv0, vertex.uv1);
+    color = vertex_color(vertex);
+    material_index = draw.material;
+}

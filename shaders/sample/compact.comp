@@ -1,0 +1,26 @@
+// The list of visible triangles with the number of rows before each: point rows, enumerated and
+// never stored, in the order of the triangles.
+// In: Spans, Segments (exclusive sums). Out: VisibleTriangles.
+
+layout(local_size_x = 64) in;
+
+#include "common/frame.glsl"
+#include "layout/Span"
+#include "layout/Visible"
+
+layout(std430) readonly restrict buffer Spans { Span spans[]; };
+layout(std430) readonly restrict buffer Segments { uvec2 segments[]; };
+layout(std430) writeonly restrict buffer VisibleTriangles { Visible visible[]; };
+
+void main() {
+    uint segment = gl_GlobalInvocationID.x;
+    uint first = segment * SEGMENT, end = min(first + SEGMENT, frame.triangles);
+    if (first >= frame.triangles) return;
+    uvec2 running = segments[segment];
+    for (uint t = first; t < end; t++) {
+        uint rows = spans[t].rows >> 16;
+        if (rows == 0u) continue;
+        visible[running.x] = Visible(t, running.y);
+        running += uvec2(1u, rows);
+    }
+}
