@@ -1,5 +1,6 @@
 """Scenes: glTF and OBJ files, procedural built-ins, and the frozen data they become."""
 
+from .limits import LoadLimits
 from .model import (
     Image,
     Instance,
@@ -14,6 +15,7 @@ from .model import (
 __all__ = [
     "Image",
     "Instance",
+    "LoadLimits",
     "Material",
     "Mesh",
     "Scene",

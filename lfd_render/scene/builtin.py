@@ -9,6 +9,7 @@ from urllib.parse import parse_qsl
 from lfd_render.errors import SceneError
 
 from .model import Scene
+from .procedural.gallery import gallery
 from .procedural.spheres import spheres
 
 PREFIX = "builtin:"
@@ -26,6 +27,11 @@ class Builtin:
 _TRIANGLES = (1_000, 10_000_000)
 
 BUILTINS: dict[str, Builtin] = {
+    "gallery": Builtin(
+        gallery,
+        {"triangles": _TRIANGLES, "textures": (16, 4096)},
+        {"triangles": 1_000_000, "textures": 1024},
+    ),
     "spheres": Builtin(spheres, {"triangles": _TRIANGLES}, {"triangles": 100_000}),
 }
 

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from lfd_render.errors import SceneError
 
+from .limits import LoadLimits
+
 Wrap = Literal["repeat", "clamp", "mirror"]
 AlphaMode = Literal["opaque", "mask", "blend"]
 WRAPS: tuple[Wrap, ...] = ("repeat", "clamp", "mirror")
@@ -241,7 +243,7 @@ class Scene:
         return low, high
 
     @staticmethod
-    def load(source: str | Path) -> Scene:
+    def load(source: str | Path, limits: LoadLimits | None = None) -> Scene:
         """Read a `.gltf` or `.glb` file, or make a `builtin:NAME?triangles=N`.
 
         Raises SceneError, or ResourceError beyond the limits, in one line that names the
@@ -249,7 +251,7 @@ class Scene:
         """
         from .loading import load_scene  # noqa: PLC0415 (the loaders import this module)
 
-        return load_scene(source)
+        return load_scene(source, limits or LoadLimits())
 
 
 def _freeze(

@@ -41,6 +41,7 @@ class Surface:
     uv_scale: tuple[float, float] = (1.0, 1.0)
     detail: float = 1.0  # triangles per area against the other surfaces of the scene
     least: tuple[int, int] = (1, 1)  # cells along u and v below which the shape is lost
+    corners: int = 1  # cells along u come in multiples of this, so that corners meet vertices
 
     def triangles(self, cells: tuple[int, int]) -> int:
         """Triangles of a grid with so many cells along u and v."""
@@ -53,7 +54,7 @@ class Surface:
         columns, rows = (
             max(n, round(s * scale)) for n, s in zip(self.least, self.size, strict=True)
         )
-        return columns, rows
+        return -(-columns // self.corners) * self.corners, rows
 
     def mesh(self, cells: tuple[int, int]) -> Mesh:
         """The surface as a mesh with so many cells along u and v."""

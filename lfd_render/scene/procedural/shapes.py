@@ -46,29 +46,79 @@ def sphere(radius: float, bumps: Relief | None = None) -> SurfaceMap:
 
 
 def lathe(
-    profile: Sequence[tuple[float, float]], flutes: int = 0, depth: float = 0.0
+    profile: Sequence[tuple[float, float]], *, square: bool = False, flutes: int = 0
 ) -> SurfaceMap:
-    """A surface of revolution about y through (radius, height) corners, top first.
+    """A closed surface round the y axis through (radius, height) corners, from its top down.
 
-    `flutes` grooves of `depth` (in units of the radius) run down the longest stretch.
+    First and last radius are 0. `square` turns circles into squares, radius then being half a
+    side; corners lie at multiples of 1/4 in u. `flutes` grooves run down the longest stretch.
     """
-    radii, heights = (np.array(c, np.float32) for c in zip(*profile, strict=True))
+    radii, heights = (np.array(c, np.float64) for c in zip(*profile, strict=True))
     steps = np.hypot(np.diff(radii), np.diff(heights))
-    knots = np.concatenate(([0.0], np.cumsum(steps))).astype(np.float32) / steps.sum()
+    knots = np.concatenate(([0.0], np.cumsum(steps))) / steps.sum()
     shaft = int(np.argmax(steps))
-    start, end = knots[shaft], knots[shaft + 1]
 
     def point(
         u: NDArray[np.float32], v: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
         r = np.interp(v, knots, radii).astype(np.float32)
-        if flutes:
-            margin = np.minimum(v - start, end - v) / ((end - start) * np.float32(0.04))
-            fade = np.clip(margin, 0.0, 1.0).astype(np.float32)
-            groove = np.abs(np.sin(u * np.float32(np.pi * flutes)))
-            r = r * (1 - np.float32(depth) * fade * groove)
+        y = np.interp(v, knots, heights).astype(np.float32)
         angle = u * _TAU
-        return r * np.sin(angle), np.interp(v, knots, heights).astype(np.float32), r * np.cos(angle)
+        sin, cos = np.sin(angle), np.cos(angle)
+        if square:
+            sin, cos = _square(u)
+        if flutes:
+            groove = np.abs(np.sin(u * np.float32(np.pi * flutes)))
+            r = r * (1 - np.float32(0.07) * _inside(v, knots[shaft], knots[shaft + 1]) * groove)
+        return r * sin, y, r * cos
+
+    return point
+
+
+def _square(u: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """A unit square's outline, [2] arrays, from (−1, 1) to (1, 1) and round to the start."""
+    side, along = np.divmod(u * np.float32(4.0), 1.0)
+    along = 2 * along - 1
+    x = np.choose(side.astype(np.int32) % 4, (along, np.ones_like(u), -along, -np.ones_like(u)))
+    z = np.choose(side.astype(np.int32) % 4, (np.ones_like(u), -along, -np.ones_like(u), along))
+    return x, z
+
+
+def _inside(v: NDArray[np.float32], start: float, end: float) -> NDArray[np.float32]:
+    """1 between start and end, with short ramps to 0 at both."""
+    ramp = np.minimum(v - start, end - v) / (0.04 * (end - start))
+    clipped: NDArray[np.float32] = np.clip(ramp, 0.0, 1.0).astype(np.float32)
+    return clipped
+
+
+def frame(width: float, height: float, rim: float, depth: float) -> SurfaceMap:
+    """A closed picture frame round a width × height opening in the xy plane, back at z = 0.
+
+    u runs round the opening from its top left corner, v round the frame's cross-section;
+    corners lie at multiples of 1/4 in u.
+    """
+    # Outer edge, crest, inner lip and back of the section, as (outward, forward).
+    section = np.array(
+        [
+            (rim, 0.0),
+            (0.8 * rim, 0.8 * depth),
+            (0.5 * rim, depth),
+            (0.15 * rim, 0.55 * depth),
+            (0.0, 0.5 * depth),
+            (0.0, 0.0),
+            (rim, 0.0),
+        ]
+    )
+    steps = np.hypot(*np.diff(section, axis=0).T)
+    knots = np.concatenate(([0.0], np.cumsum(steps))) / steps.sum()
+
+    def point(
+        u: NDArray[np.float32], v: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+        outward = np.interp(v, knots, section[:, 0]).astype(np.float32)
+        forward = np.interp(v, knots, section[:, 1]).astype(np.float32)
+        x, y = _square(u)  # clockwise as seen from the front, left to right on top
+        return x * (width / 2 + outward), y * (height / 2 + outward), forward + 0 * u
 
     return point
 

@@ -1,0 +1,69 @@
+"""glTF 2.0 files, `.gltf` and `.glb`, as scenes.
+
+Animations, skins and morph targets stand in their rest pose; points, lines and orthographic
+cameras are left out; each of these gives a warning.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from lfd_render.errors import ResourceError
+
+from .files import SceneFiles
+from .gltf_accessors import Accessors
+from .gltf_document import Document
+from .gltf_materials import Materials
+from .gltf_meshes import Meshes
+from .gltf_nodes import NodeTree
+from .limits import Budget, LoadLimits
+from .model import Instance, Scene
+
+
+def load_gltf(path: Path, limits: LoadLimits) -> Scene:
+    """Read a glTF file and the files beside it.
+
+    Raises SceneError or ResourceError with the field, its value and the remedy.
+    """
+    document = Document(SceneFiles(path, limits), Budget(limits))
+    accessors = Accessors(document)
+    tree = NodeTree(document)
+    materials = Materials(document, accessors)
+    meshes = Meshes(document, accessors, materials, tree)
+    instances = _instances(document, tree, meshes)
+    if document.root.children("animations"):
+        document.warn("animations: not played; the scene stands in its rest pose")
+    return Scene(
+        name=path.stem,
+        meshes=tuple(meshes.meshes),
+        instances=tuple(instances),
+        materials=materials.materials(),
+        images=materials.decode() if instances else (),
+        cameras=tree.cameras(),
+        warnings=document.warnings,
+    )
+
+
+def _instances(document: Document, tree: NodeTree, meshes: Meshes) -> list[Instance]:
+    instances: list[Instance] = []
+    limit = document.budget.limits.nodes
+    for node in tree.drawn():
+        fields = document.nodes[node]
+        mesh_index = fields.index("mesh", len(document.meshes))
+        if mesh_index is None:
+            continue
+        # A skinned mesh comes from its joints into the world; its node's transform is ignored.
+        skinned = "skin" in fields
+        world_from_local = np.eye(4) if skinned else tree.world_from_node[node]
+        if not skinned and np.linalg.matrix_rank(world_from_local[:3, :3]) < 2:
+            document.warn(f"{fields.path}: scaled to a line or a point and left out")
+            continue
+        name = fields.text("name", f"node {node}")
+        instances.extend(
+            Instance(name, place, world_from_local) for place in meshes.place(mesh_index, fields)
+        )
+        if len(instances) > limit:
+            raise ResourceError(f"nodes: more than {limit} instances; give a smaller scene")
+    return instances

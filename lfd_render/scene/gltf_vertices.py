@@ -1,0 +1,133 @@
+"""The vertex attributes of one glTF primitive, checked against each other, unused ones dropped."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lfd_render.errors import SceneError
+
+from .fields import Fields
+from .gltf_accessors import Accessors
+from .gltf_document import Document
+from .gltf_skins import Skinning, morph
+
+
+class Vertices:
+    """The attributes of one primitive, each with as many elements as POSITION."""
+
+    def __init__(
+        self,
+        primitive: Fields,
+        weights: Sequence[float],
+        accessors: Accessors,
+        document: Document,
+    ) -> None:
+        """`weights` are those of the morph targets; none at all stands for zeros."""
+        self._primitive = primitive
+        self._weights = weights
+        self._attributes = primitive.child("attributes")
+        self._targets = primitive.children("targets")
+        self._accessors = accessors
+        self._document = document
+        self._used: NDArray[np.int64] | None = None
+        if "POSITION" not in self._attributes:
+            self._attributes.fail("POSITION", "give vertex positions")
+        self._file_count = accessors.count(self._index(self._attributes, "POSITION"))
+
+    @property
+    def count(self) -> int:
+        """Vertices of the mesh; before keep_used, of the file."""
+        return self._file_count if self._used is None else len(self._used)
+
+    def has(self, name: str) -> bool:
+        """Whether the primitive has an attribute."""
+        return name in self._attributes
+
+    def keep_used(self, triangles: NDArray[np.uint32]) -> NDArray[np.uint32]:
+        """Drop vertices that no triangle uses; returns the triangles renumbered.
+
+        Exporters share one large vertex buffer between many primitives; without this each of
+        them would hold it whole.
+        """
+        if triangles.size < self._file_count:
+            used, inverse = np.unique(triangles, return_inverse=True)
+            self._used = used.astype(np.int64)
+            return inverse.reshape(-1, 3).astype(np.uint32)
+        touched = np.zeros(self._file_count, bool)
+        touched[triangles] = True
+        if touched.all():
+            return triangles
+        self._used = np.flatnonzero(touched)
+        renumbered = np.cumsum(touched, dtype=np.uint32) - np.uint32(1)
+        return renumbered[triangles]
+
+    def morphed(self, name: str) -> NDArray[np.float32]:
+        """POSITION or NORMAL, [n, 3], with the morph targets at their default weights."""
+        base = self._floats(self._attributes, name, ("VEC3",))
+        if not self._targets or not any(self._weights):
+            return base
+        if len(self._weights) != len(self._targets):
+            raise SceneError(
+                f"{self._primitive.path}.targets: {len(self._targets)} targets and "
+                f"{len(self._weights)} weights; give as many weights as targets"
+            )
+        pairs = [(t, w) for t, w in zip(self._targets, self._weights, strict=True) if name in t]
+        deltas = [self._floats(t, name, ("VEC3",)) for t, _ in pairs]
+        return morph(base, deltas, [w for _, w in pairs])
+
+    def texcoords(self) -> NDArray[np.float32]:
+        """Both coordinate sets, [n, 2, 2] as [vertex, set, uv], zero where absent."""
+        out = np.zeros((self.count, 2, 2), np.float32)
+        for number, name in enumerate(("TEXCOORD_0", "TEXCOORD_1")):
+            if self.has(name):
+                out[:, number] = self._floats(self._attributes, name, ("VEC2",))
+        return out
+
+    def colors(self) -> NDArray[np.float32]:
+        """Linear vertex colours, [n, 4], white where absent."""
+        out = np.ones((self.count, 4), np.float32)
+        if self.has("COLOR_0"):
+            values = self._floats(self._attributes, "COLOR_0", ("VEC3", "VEC4"), normalized=True)
+            out[:, : values.shape[1]] = values
+        return out
+
+    def skinning(self, matrices: NDArray[np.float64]) -> Skinning | None:
+        """The joints and weights of all sets; None, with a warning, where there are none."""
+        joints: list[NDArray[np.int64]] = []
+        weights: list[NDArray[np.float32]] = []
+        while self.has(f"JOINTS_{len(joints)}") and self.has(f"WEIGHTS_{len(joints)}"):
+            key = f"JOINTS_{len(joints)}"
+            values = self._accessors.integers(self._index(self._attributes, key), ("VEC4",))
+            self._check_count(self._attributes, key, len(values))
+            values = values if self._used is None else values[self._used]
+            if int(values.max()) >= len(matrices):
+                self._attributes.fail(
+                    key, f"joint {int(values.max())} is named, the skin has {len(matrices)}"
+                )
+            key = f"WEIGHTS_{len(joints)}"
+            weights.append(self._floats(self._attributes, key, ("VEC4",), normalized=True))
+            joints.append(values)
+        if not joints:
+            self._document.warn(f"{self._primitive.path}: skinned without JOINTS_0 and WEIGHTS_0")
+            return None
+        return Skinning(matrices, np.concatenate(joints, axis=1), np.concatenate(weights, axis=1))
+
+    def _floats(
+        self, owner: Fields, name: str, types: Sequence[str], normalized: bool = False
+    ) -> NDArray[np.float32]:
+        values = self._accessors.floats(self._index(owner, name), types, normalized)
+        self._check_count(owner, name, len(values))
+        return values if self._used is None else values[self._used]
+
+    def _check_count(self, owner: Fields, name: str, count: int) -> None:
+        if count != self._file_count:
+            owner.fail(name, f"the accessor has {count} elements, POSITION {self._file_count}")
+
+    def _index(self, owner: Fields, name: str) -> int:
+        index = owner.index(name, len(self._document.accessors))
+        if index is None:
+            owner.fail(name, "give the index of an accessor")
+        return index

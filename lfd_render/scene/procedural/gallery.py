@@ -1,0 +1,383 @@
+"""`builtin:gallery`: a museum hall that fills the view, with four texture maps on every surface.
+
+Metres. The window is 3 m high round the origin, 1.65 m above the floor; the hall is a closed
+room that contains it, so each ray through the window meets a wall, from any eye and at any yaw.
+Two statues stand in front of the window plane, the rest of the hall lies behind it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import Image, Instance, Material, Scene, TextureSlot
+from . import materials as paint
+from .grid import Surface, SurfaceMap, tessellate
+from .shapes import frame, lathe, plane, sphere, torus_knot
+from .textures import TextureSet, to_pixels
+
+_HALF_WIDTH, _FLOOR, _CEILING, _BACK, _FRONT = 4.4, -1.65, 2.35, -5.6, 4.4
+_HEIGHT, _DEPTH = _CEILING - _FLOOR, _FRONT - _BACK
+_WINDOW_HEIGHT = 3.0
+
+_SETS: dict[str, Callable[[int], TextureSet]] = {
+    "floor": paint.floor_tiles,
+    "damask": paint.damask,
+    "plaster": paint.plaster,
+    "marble": paint.marble,
+    "granite": paint.granite,
+    "bronze": paint.bronze,
+    "gilt": paint.gilt,
+    "lamp": paint.lamp_glass,
+    "canvas": paint.canvas,
+}
+_PAINTINGS = (
+    (5, "35507a", "f0b46a", ("6d7f93", "4c6470", "2f4a48", "1b2f2a")),
+    (8, "88b4d8", "f4e6c4", ("9fb2a8", "6f9a72", "3f7040", "274c2a")),
+    (12, "2a2350", "d8618a", ("6a4a80", "483468", "2c2148", "171230")),
+    (17, "d9c9a0", "f3f0e2", ("c0a070", "a87848", "7c5030", "50301c")),
+)
+_MATERIALS = (*_SETS, *(f"painting {i + 1}" for i in range(len(_PAINTINGS))))
+
+
+@dataclass
+class _Hall:
+    """Surfaces and where they stand; built up part by part, then tessellated at once."""
+
+    surfaces: list[Surface] = field(default_factory=list)
+    places: list[list[NDArray[np.float64]]] = field(default_factory=list)
+
+    def add(self, surface: Surface, *places: NDArray[np.float64]) -> None:
+        """Put a surface at one or more places; no place means the world's origin."""
+        self.surfaces.append(surface)
+        self.places.append(list(places) or [np.eye(4)])
+
+    def instances(self) -> Iterator[Instance]:
+        """All places in order."""
+        for i, (surface, places) in enumerate(zip(self.surfaces, self.places, strict=True)):
+            yield from (Instance(surface.name, i, place) for place in places)
+
+
+def gallery(triangles: int, textures: int) -> Scene:
+    """The hall with about `triangles` triangles and maps of `textures`² texels."""
+    hall = _Hall()
+    _add_room(hall)
+    _add_columns(hall)
+    _add_sculptures(hall)
+    _add_pictures(hall)
+    _add_lamps(hall)
+    meshes = tessellate(hall.surfaces, [len(p) for p in hall.places], triangles)
+    materials, images = _materials(textures)
+    return Scene(
+        name="gallery",
+        meshes=tuple(meshes),
+        instances=tuple(hall.instances()),
+        materials=materials,
+        images=images,
+        default_camera={
+            "target": [0.0, 0.0, 0.0],
+            "eye_direction": [0.0, 0.0, 1.0],
+            "up": [0.0, 1.0, 0.0],
+            "window_height": _WINDOW_HEIGHT,
+        },
+    )
+
+
+def _add_room(hall: _Hall) -> None:
+    w, d, h = _HALF_WIDTH, _DEPTH, _HEIGHT
+    floor = plane((-w, _FLOOR, _BACK), (2 * w, 0, 0), (0, 0, d))
+    hall.add(_wall("floor", "floor", floor, (2 * w, d), 2.0))
+    ceiling = plane((-w, _CEILING, _FRONT), (2 * w, 0, 0), (0, 0, -d), _coffers)
+    hall.add(_wall("ceiling", "plaster", ceiling, (2 * w, d), 2.0, detail=1.5))
+    back = plane((-w, _CEILING, _BACK), (2 * w, 0, 0), (0, -h, 0), _niche)
+    hall.add(_wall("back wall", "damask", back, (2 * w, h), 1.6, detail=2.0))
+    left = plane((-w, _CEILING, _FRONT), (0, 0, -d), (0, -h, 0), _panels)
+    hall.add(_wall("left wall", "damask", left, (d, h), 1.6))
+    right = plane((w, _CEILING, _BACK), (0, 0, d), (0, -h, 0), _panels)
+    hall.add(_wall("right wall", "damask", right, (d, h), 1.6))
+    front = plane((w, _CEILING, _FRONT), (-2 * w, 0, 0), (0, -h, 0), _panels)
+    hall.add(_wall("front wall", "damask", front, (2 * w, h), 1.6, detail=0.2))
+
+
+def _wall(
+    name: str,
+    material: str,
+    point: SurfaceMap,
+    size: tuple[float, float],
+    tile: float,
+    *,
+    detail: float = 1.0,
+) -> Surface:
+    """An open surface of the room whose texture repeats every `tile` metres."""
+    return Surface(
+        name,
+        point,
+        size,
+        _MATERIALS.index(material),
+        uv_scale=(size[0] / tile, size[1] / tile),
+        detail=detail,
+    )
+
+
+def _step(value: NDArray[np.float32], start: float, width: float) -> NDArray[np.float32]:
+    """A smooth step from 0 to 1 that begins at `start`."""
+    t = np.clip((value - np.float32(start)) / np.float32(width), 0.0, 1.0)
+    smooth: NDArray[np.float32] = t * t * (3 - 2 * t)
+    return smooth
+
+
+def _coffers(u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Beams 0.22 m deep round recessed fields, 6 across and 7 along the hall."""
+    across = np.abs((u * 6) % 1 - np.float32(0.5))
+    along = np.abs((v * 7) % 1 - np.float32(0.5))
+    edge = np.maximum(across, along)
+    beams = np.float32(0.16) * _step(edge, 0.34, 0.04)
+    relief: NDArray[np.float32] = beams + np.float32(0.06) * _step(edge, 0.26, 0.03)
+    return relief
+
+
+def _wainscot(v: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Skirting, dado rail and cornice, in metres from the wall; v runs down its height."""
+    y = v * np.float32(_HEIGHT)
+    cornice = np.float32(0.16) * (1 - _step(y, 0.10, 0.14))
+    rail = np.float32(0.05) * _step(y, 2.92, 0.03) * (1 - _step(y, 3.02, 0.04))
+    skirting = np.float32(0.06) * _step(y, 3.78, 0.05)
+    relief: NDArray[np.float32] = cornice + rail + skirting
+    return relief
+
+
+def _panels(u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Raised panel mouldings, five along the wall, under the cornice and over the rail."""
+    x = np.abs((u * 5) % 1 - np.float32(0.5)) * np.float32(2.0)
+    y = np.abs(v - np.float32(0.40)) * np.float32(2.0)
+    edge = np.maximum(np.float32(0.44) - np.abs(x - np.float32(0.41)) - np.float32(0.40), 0)
+    side = edge * (y < 0.62)
+    bar = np.maximum(np.float32(0.04) - np.abs(y - np.float32(0.60)), 0) * (x < 0.44)
+    relief: NDArray[np.float32] = _wainscot(v) + np.minimum(np.maximum(side, bar), 0.03)
+    return relief
+
+
+def _niche(u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A half-round arched niche, 0.9 m deep, in the middle of the wall, with a moulded edge."""
+    x = (u - np.float32(0.5)) * np.float32(2 * _HALF_WIDTH)
+    y = np.float32(_CEILING) - v * np.float32(_HEIGHT)
+    above = np.maximum(y - np.float32(0.55), 0.0)
+    radius = np.hypot(x, above)
+    hollow = np.float32(0.9) * np.sqrt(np.clip(1 - (radius / np.float32(1.05)) ** 2, 0.0, 1.0))
+    rim = np.float32(0.06) * (_step(radius, 1.05, 0.03) - _step(radius, 1.22, 0.05))
+    relief: NDArray[np.float32] = _wainscot(v) * _step(radius, 1.05, 0.02) + rim - hollow
+    return relief
+
+
+def _at(x: float, y: float, z: float, yaw_deg: float = 0.0) -> NDArray[np.float64]:
+    """`world_from_local` of a turn about y and a move."""
+    angle = np.deg2rad(yaw_deg)
+    matrix = np.eye(4)
+    matrix[0, 0] = matrix[2, 2] = np.cos(angle)
+    matrix[0, 2], matrix[2, 0] = np.sin(angle), -np.sin(angle)
+    matrix[:3, 3] = (x, y, z)
+    return matrix
+
+
+def _turned(
+    name: str,
+    material: str,
+    profile: list[tuple[float, float]],
+    *,
+    square: bool = False,
+    flutes: int = 0,
+    detail: float = 4.0,
+    least: tuple[int, int] = (5, 4),
+    tile: float = 0.8,
+) -> Surface:
+    """A lathe's surface with texture tiles of about `tile` metres that close round it."""
+    radii, heights = np.array(profile).T
+    around = 2 * np.pi * float(radii.max()) * (4 / np.pi if square else 1)
+    down = float(np.hypot(np.diff(radii), np.diff(heights)).sum())
+    return Surface(
+        name,
+        lathe(profile, square=square, flutes=flutes),
+        (around, down),
+        _MATERIALS.index(material),
+        closed_u=True,
+        poles=True,
+        uv_scale=(max(1, round(around / tile)), down / tile),
+        detail=detail,
+        least=least,
+        corners=4 if square else 1,
+    )
+
+
+def _add_columns(hall: _Hall) -> None:
+    top = _HEIGHT
+    profile = [
+        (0.0, top), (0.42, top), (0.42, top - 0.12), (0.34, top - 0.20), (0.30, top - 0.32),
+        (0.25, top - 0.36), (0.29, 0.42), (0.37, 0.34), (0.33, 0.26), (0.42, 0.16),
+        (0.42, 0.0), (0.0, 0.0),
+    ]  # fmt: skip
+    column = _turned("column", "marble", profile, flutes=20, least=(4, 4), detail=3.0)
+    places = [_at(x, _FLOOR, z) for z in (-4.6, -2.7, -0.8, 3.0) for x in (-3.35, 3.35)]
+    hall.add(column, *places)
+
+
+def _plinth(hall: _Hall, height: float, half: float, *places: NDArray[np.float64]) -> None:
+    profile = [
+        (0.0, height), (half, height), (half, height - 0.06), (0.85 * half, height - 0.10),
+        (0.80 * half, 0.16), (half, 0.10), (half, 0.0), (0.0, 0.0),
+    ]  # fmt: skip
+    hall.add(_turned("plinth", "granite", profile, square=True, least=(4, 3)), *places)
+
+
+def _add_sculptures(hall: _Hall) -> None:
+    _plinth(hall, 0.86, 0.34, _at(-1.35, _FLOOR, 0.42, 20), _at(1.45, _FLOOR, 0.20, -15))
+    hall.add(_knot("bronze knot", "bronze", (2, 3), 0.46, 0.13), _at(-1.35, -0.13, 0.42, 25))
+    bumpy = _round("gilt planet", "gilt", 0.46, bumps=_bumps)
+    hall.add(bumpy, _at(1.45, -0.31, 0.20))
+    _plinth(hall, 0.62, 0.48, _at(0.0, _FLOOR, -1.7, 45))
+    hall.add(_knot("great knot", "gilt", (3, 4), 0.72, 0.12), _at(0.0, -0.16, -1.7, -20))
+    _plinth(hall, 0.95, 0.30, _at(-2.2, _FLOOR, -3.2), _at(2.2, _FLOOR, -3.2))
+    hall.add(_vase(), _at(-2.2, _FLOOR + 0.95, -3.2), _at(2.2, _FLOOR + 0.95, -3.2))
+    hall.add(_figure(), _at(0.0, _FLOOR + 0.0, -5.75))
+
+
+def _knot(
+    name: str, material: str, winding: tuple[int, int], radius: float, tube: float
+) -> Surface:
+    # The curve turns `p` times at two thirds of the radius and swings `q` times inside the ring.
+    along = 2 * np.pi * radius * float(np.hypot(winding[0] * 0.67, winding[1] * 0.33))
+    return Surface(
+        name,
+        torus_knot(*winding, radius, tube),
+        (along, 2 * np.pi * tube),
+        _MATERIALS.index(material),
+        closed_u=True,
+        closed_v=True,
+        uv_scale=(max(1, round(along / (2 * np.pi * tube))), 1.0),
+        detail=6.0,
+        least=(12, 3),
+    )
+
+
+def _round(
+    name: str,
+    material: str,
+    radius: float,
+    *,
+    bumps: Callable[[NDArray[np.float32], NDArray[np.float32]], NDArray[np.float32]] | None = None,
+    uv_scale: tuple[float, float] = (4.0, 2.0),
+    least: tuple[int, int] = (6, 3),
+) -> Surface:
+    return Surface(
+        name,
+        sphere(radius, bumps),
+        (2 * np.pi * radius, np.pi * radius),
+        _MATERIALS.index(material),
+        closed_u=True,
+        poles=True,
+        uv_scale=uv_scale,
+        detail=6.0,
+        least=least,
+    )
+
+
+def _bumps(u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Knobs in rings that fade toward the poles."""
+    turn = np.float32(2 * np.pi)
+    knobs = np.cos(turn * 8 * u) * np.cos(turn * 5 * v) + 0.35 * np.cos(turn * (3 * u + 2 * v))
+    faded: NDArray[np.float32] = 0.07 * knobs * np.sin(v * np.float32(np.pi)) ** 2
+    return faded
+
+
+def _vase() -> Surface:
+    profile = [
+        (0.0, 0.72), (0.09, 0.72), (0.13, 0.76), (0.11, 0.68), (0.08, 0.58), (0.17, 0.48),
+        (0.22, 0.38), (0.20, 0.26), (0.12, 0.12), (0.09, 0.06), (0.13, 0.0), (0.0, 0.0),
+    ]  # fmt: skip
+    return _turned("vase", "bronze", profile, detail=6.0)
+
+
+def _figure() -> Surface:
+    """A turned marble figure on its own drum, for the niche."""
+    profile = [
+        (0.0, 2.30), (0.11, 2.27), (0.16, 2.18), (0.15, 2.06), (0.08, 1.97), (0.10, 1.90),
+        (0.26, 1.84), (0.29, 1.70), (0.22, 1.40), (0.19, 1.25), (0.27, 0.95), (0.36, 0.55),
+        (0.40, 0.50), (0.50, 0.46), (0.50, 0.06), (0.56, 0.0), (0.0, 0.0),
+    ]  # fmt: skip
+    return _turned("figure", "marble", profile, detail=6.0)
+
+
+def _add_pictures(hall: _Hall) -> None:
+    width, height, y = 1.25, 1.0, 0.42
+    offset = 0.09  # clear of the wall's mouldings
+    side = _HALF_WIDTH - offset
+    places = [
+        _at(-2.75, y, _BACK + offset),
+        _at(2.75, y, _BACK + offset),
+        _at(-side, y, -3.65, 90),
+        _at(side, y, -3.65, -90),
+        _at(-side, y, -1.75, 90),
+        _at(side, y, -1.75, -90),
+    ]
+    rim = 0.13
+    border = Surface(
+        "picture frame",
+        frame(width, height, rim, 0.09),
+        (2 * (width + height + 4 * rim), 3.2 * rim),
+        _MATERIALS.index("gilt"),
+        closed_u=True,
+        closed_v=True,
+        uv_scale=(16.0, 1.0),
+        detail=6.0,
+        least=(4, 3),
+        corners=4,
+    )
+    hall.add(border, *places)
+    for i in range(len(_PAINTINGS)):
+        corner = (-width / 2, height / 2, 0.02)
+        canvas = plane(corner, (width, 0, 0), (0, -height, 0))
+        name = f"painting {i + 1}"
+        surface = Surface(name, canvas, (width, height), _MATERIALS.index(name), detail=0.5)
+        hall.add(surface, *places[i :: len(_PAINTINGS)])
+
+
+def _add_lamps(hall: _Hall) -> None:
+    spots = [(x, z) for z in (-3.6, -1.2) for x in (-1.5, 1.5)]
+    globe = _round("lamp", "lamp", 0.17, uv_scale=(1.0, 1.0), least=(5, 3))
+    hall.add(globe, *(_at(x, 1.42, z) for x, z in spots))
+    rod = [(0.0, 0.85), (0.10, 0.84), (0.012, 0.78), (0.012, 0.06), (0.05, 0.0), (0.0, 0.0)]
+    surface = _turned("lamp rod", "gilt", rod, detail=8.0, least=(3, 3), tile=0.3)
+    hall.add(surface, *(_at(x, 1.55, z) for x, z in spots))
+
+
+def _materials(size: int) -> tuple[tuple[Material, ...], tuple[Image, ...]]:
+    """Materials in the order of their names, and their pictures, made on two threads."""
+    with ThreadPoolExecutor(2) as pool:
+        sets = pool.map(lambda make: make(size).images(), _SETS.values())
+        scenes = pool.map(lambda p: paint.painting(size, *p), _PAINTINGS)
+        images: list[Image] = [image for triple in sets for image in triple]
+        first_painting = len(images)
+        images += [Image(f"painting {i + 1}", to_pixels(p)) for i, p in enumerate(scenes)]
+    materials = [_material(name, 3 * i, 3 * i) for i, name in enumerate(_SETS)]
+    maps = 3 * list(_SETS).index("canvas")
+    materials += [
+        _material(f"painting {i + 1}", first_painting + i, maps) for i in range(len(_PAINTINGS))
+    ]
+    return tuple(materials), tuple(images)
+
+
+def _material(name: str, color: int, maps: int) -> Material:
+    """A material whose colour is image `color` and whose normal and ORM follow image `maps`."""
+    lit = name == "lamp"
+    return Material(
+        name,
+        emissive=(6.0, 5.0, 3.4) if lit else (0.0, 0.0, 0.0),
+        base_color_texture=TextureSlot(color),
+        normal_texture=TextureSlot(maps + 1),
+        occlusion_texture=TextureSlot(maps + 2),
+        metallic_roughness_texture=TextureSlot(maps + 2),
+        emissive_texture=TextureSlot(color) if lit else None,
+    )

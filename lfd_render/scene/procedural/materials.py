@@ -1,0 +1,139 @@
+"""The texture sets of the gallery: marble, granite, damask, plaster, metals, canvas, paintings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .textures import Field, TextureSet, grid, mix, noise, rgb
+
+_PI = np.float32(np.pi)
+
+
+def floor_tiles(size: int) -> TextureSet:
+    """Four by four polished marble tiles, black and cream, with sunken joints."""
+    u, v = grid(size)
+    tiles = 4
+    across, down = u * tiles, v * tiles
+    dark = ((across.astype(np.int32) + down.astype(np.int32)) % 2).astype(np.float32)
+    edge = np.minimum(np.minimum(across % 1, 1 - across % 1), np.minimum(down % 1, 1 - down % 1))
+    joint = np.clip(1.0 - edge / np.float32(0.012), 0.0, 1.0).astype(np.float32)
+    veins = _veins(size, 11, 2.0)
+    clouds = noise(size, 12, 1.8)
+    light = mix(rgb("e6dcc8"), rgb("a58a66"), 0.65 * veins + 0.06 * clouds)
+    black = mix(rgb("1d1b1e"), rgb("b9ad9a"), 0.55 * np.roll(veins, size // 3, axis=1) ** 2)
+    color = mix(mix(light, black, dark), rgb("4a4238"), joint)
+    height = -0.004 * joint + 0.00004 * clouds
+    roughness = 0.16 + 0.05 * np.clip(clouds, -1, 2) + 0.55 * joint
+    return TextureSet("floor tiles", color, height, roughness.astype(np.float32))
+
+
+def damask(size: int) -> TextureSet:
+    """Deep red wall cloth with a woven ornament that is smoother than its ground."""
+    u, v = grid(size)
+    count = np.float32(3.0)
+    x, y = u * count, v * count
+    petals = (
+        np.cos(2 * _PI * x) + np.cos(2 * _PI * y) + 0.7 * np.cos(4 * _PI * x) * np.cos(2 * _PI * y)
+    )
+    petals = petals + 0.6 * np.cos(2 * _PI * (x + y)) * np.cos(2 * _PI * (x - y))
+    ornament = np.clip(2.5 * np.cos(1.9 * petals), -1.0, 1.0) * 0.5 + 0.5
+    thread = np.sin(2 * _PI * 128 * v) * np.float32(0.5) + np.sin(2 * _PI * 128 * u) * 0.5
+    worn = noise(size, 21, 1.4)
+    color = mix(rgb("5c1020"), rgb("8e2a33"), ornament + 0.08 * worn)
+    color *= (1.0 + 0.05 * thread + 0.02 * worn)[..., None]
+    height = 0.0022 * ornament + 0.00025 * thread + 0.00005 * worn
+    roughness = 0.85 - 0.3 * ornament + 0.03 * worn
+    return TextureSet("damask", color, height.astype(np.float32), roughness.astype(np.float32))
+
+
+def plaster(size: int) -> TextureSet:
+    """Warm white plaster, brushed and a little uneven."""
+    rough = noise(size, 31, 1.1, 6.0)
+    stains = noise(size, 32, 1.9)
+    color = mix(rgb("e9e2d3"), rgb("c9bda5"), 0.35 + 0.16 * stains + 0.1 * rough)
+    return TextureSet("plaster", color, 0.0006 * rough, 0.9 + 0.03 * rough)
+
+
+def marble(size: int) -> TextureSet:
+    """White marble with grey veins."""
+    veins = _veins(size, 41, 1.5)
+    clouds = noise(size, 42, 1.9)
+    color = mix(rgb("efece6"), rgb("7d7f86"), 0.75 * veins**1.5 + 0.1 + 0.08 * clouds)
+    return TextureSet("marble", color, 0.0003 * noise(size, 43, 1.2, 8.0), 0.28 + 0.12 * veins)
+
+
+def granite(size: int) -> TextureSet:
+    """Dark speckled granite."""
+    grain = noise(size, 51, 0.2, 60.0)
+    flakes = noise(size, 52, 0.3, 40.0)
+    color = mix(rgb("34343a"), rgb("9a948e"), 0.35 * grain + 0.12)
+    color = mix(color, rgb("120f12"), 1.4 * flakes - 1.1)
+    return TextureSet("granite", color, 0.0004 * grain, 0.38 + 0.06 * flakes)
+
+
+def bronze(size: int) -> TextureSet:
+    """Cast bronze, polished where it is touched and green where it is not."""
+    cast = noise(size, 61, 1.2, 4.0)
+    patina = np.clip(noise(size, 62, 1.5) * 0.9 - 0.55, 0.0, 1.0)
+    color = mix(rgb("b98a58"), rgb("8a5a30"), 0.4 + 0.2 * cast)
+    color = mix(color, rgb("5f8f7d"), patina)
+    return TextureSet(
+        "bronze", color, 0.0012 * cast, 0.30 + 0.05 * cast + 0.45 * patina, 1.0 - 0.9 * patina
+    )
+
+
+def gilt(size: int) -> TextureSet:
+    """Hammered gold leaf: a lattice of shallow dents and a little wear."""
+    u, v = grid(size)
+    count = np.float32(16.0)
+    dents = np.abs(np.sin(_PI * count * u) * np.sin(_PI * count * v)).astype(np.float32)
+    worn = noise(size, 71, 1.6)
+    color = mix(rgb("f2cf7e"), rgb("b98832"), 0.35 + 0.22 * worn)
+    return TextureSet("gilt", color, 0.004 * dents + 0.0004 * worn, 0.26 + 0.07 * worn, 1.0)
+
+
+def canvas(size: int) -> TextureSet:
+    """The weave and varnish of a painting; its colours come from `painting`."""
+    u, v = grid(size)
+    weave = np.sin(2 * _PI * 192 * u) * np.sin(2 * _PI * 192 * v)
+    strokes = noise(size, 81, 1.0, 8.0)
+    height = (0.0002 * weave + 0.0006 * strokes).astype(np.float32)
+    color = np.broadcast_to(rgb("d8cdb8"), (size, size, 3))
+    return TextureSet("canvas", color, height, 0.42 + 0.05 * strokes)
+
+
+def lamp_glass(size: int) -> TextureSet:
+    """Frosted glass with ribs; the same pattern, brighter, is its emission."""
+    u, v = grid(size)
+    ribs = (np.cos(2 * _PI * 24 * u) + 0 * v).astype(np.float32)
+    glow = ((0.8 + 0.2 * ribs) * np.sin(_PI * v) ** 0.4).astype(np.float32)
+    color = mix(rgb("a06a30"), rgb("fff0d2"), glow)
+    return TextureSet("lamp glass", color, 0.002 * ribs, 0.5)
+
+
+def painting(size: int, seed: int, sky: str, sun: str, hills: tuple[str, ...]) -> Field:
+    """A landscape, [y, x, 3] sRGB: sky, sun and ranges of hills that fade with distance."""
+    u, v = grid(size)
+    clouds = noise(size, seed, 1.7)
+    color = mix(rgb(sky), rgb(sun), 1.3 * v - 0.2 + 0.12 * clouds)
+    disc = np.hypot(u - np.float32(0.3 + 0.07 * (seed % 5)), (v - 0.3) * 0.8)
+    color = mix(color, rgb("fff6dc"), (0.075 - disc) * 60)
+    color = mix(color, rgb(sun), 0.6 * np.exp(-((disc / np.float32(0.22)) ** 2)))
+    for i, code in enumerate(hills):
+        ridge = noise(size, seed + 100 + i, 1.5)[:1] * np.float32(0.045 * (1 + 0.4 * i))
+        line = np.float32(0.48 + 0.5 * i / len(hills)) + ridge
+        inside = ((v - line) * 90).astype(np.float32)
+        shade = 1.0 + 0.10 * np.roll(clouds, 37 * (i + 1), axis=0) - 0.5 * np.clip(v - line, 0, 1)
+        color = mix(color, (rgb(code) * shade[..., None]).astype(np.float32), inside)
+    return color
+
+
+def _veins(size: int, seed: int, turbulence: float) -> Field:
+    """Thin winding lines: 1 on the line and 0 off it."""
+    u, v = grid(size)
+    warp = noise(size, seed, 1.6)
+    lines = np.abs(np.sin(2 * _PI * (u + 2 * v) + turbulence * warp))
+    fine = np.abs(noise(size, seed + 1, 1.5))
+    strong = np.clip(1.0 - 5.0 * lines, 0.0, 1.0)
+    veins: Field = np.maximum(strong, 0.6 * np.clip(1.0 - 12.0 * fine, 0.0, 1.0))
+    return veins

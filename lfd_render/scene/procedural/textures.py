@@ -1,0 +1,124 @@
+"""Seamless procedural texture sets: base colour, normal, and occlusion-roughness-metallic.
+
+All noise is spectral, so every texture tiles; seeds are fixed, so every run gives the same bytes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import Image
+
+Field = NDArray[np.float32]  # [y, x], one tile, rows top to bottom
+
+
+@dataclass(frozen=True, eq=False)
+class TextureSet:
+    """What a surface looks like over one tile, before it is packed into pictures.
+
+    `color` is [y, x, 3] sRGB in 0…1; `height` is in tile widths (it gives normals and occlusion);
+    roughness and metallic are fields or numbers in 0…1.
+    """
+
+    name: str
+    color: Field
+    height: Field
+    roughness: Field | float
+    metallic: Field | float = 0.0
+
+    def images(self) -> tuple[Image, Image, Image]:
+        """Base colour (sRGB), tangent-space normals (+y up), and occlusion-roughness-metallic."""
+        return (
+            Image(f"{self.name} base colour", to_pixels(self.color)),
+            Image(f"{self.name} normal", normal_pixels(self.height)),
+            Image(f"{self.name} occlusion-roughness-metallic", self._orm()),
+        )
+
+    def _orm(self) -> NDArray[np.uint8]:
+        size = len(self.height)
+        packed = np.empty((size, size, 3), np.float32)
+        # Hollows see less of the sky: depth below the smoothed surface, in 1/60 of a tile.
+        packed[..., 0] = 1.0 + 60.0 * np.minimum(self.height - _smooth(self.height), 0.0)
+        packed[..., 1] = self.roughness
+        packed[..., 2] = self.metallic
+        return to_pixels(packed)
+
+
+def to_pixels(color: Field) -> NDArray[np.uint8]:
+    """[y, x, 3] in 0…1 as opaque [y, x, 4] bytes, rounded."""
+    pixels = np.empty((*color.shape[:2], 4), np.uint8)
+    pixels[..., :3] = np.clip(color, 0.0, 1.0) * np.float32(255.0) + np.float32(0.5)
+    pixels[..., 3] = 255
+    return pixels
+
+
+def normal_pixels(height: Field) -> NDArray[np.uint8]:
+    """Tangent-space normals of a tiling height field: x along u, y up the picture (glTF)."""
+    size = np.float32(len(height))
+    slope_x = (np.roll(height, -1, axis=1) - np.roll(height, 1, axis=1)) * (size / 2)
+    slope_y = (np.roll(height, 1, axis=0) - np.roll(height, -1, axis=0)) * (size / 2)
+    length = np.sqrt(slope_x**2 + slope_y**2 + 1.0)
+    normal = np.stack((-slope_x, -slope_y, np.ones_like(height)), axis=-1) / length[..., None]
+    return to_pixels((normal * 0.5 + 0.5).astype(np.float32))
+
+
+@lru_cache(maxsize=8)
+def _frequency(size: int) -> Field:
+    """Cycles a tile of each coefficient of rfft2, [size, size // 2 + 1]; 1 at the constant."""
+    fy = np.fft.fftfreq(size, 1.0 / size).astype(np.float32)[:, None]
+    fx = np.fft.rfftfreq(size, 1.0 / size).astype(np.float32)[None, :]
+    frequency = np.hypot(fy, fx)
+    frequency[0, 0] = 1.0
+    return frequency
+
+
+def noise(size: int, seed: int, falloff: float = 1.6, lowest: float = 1.0) -> Field:
+    """Tiling fractal noise of mean 0 and deviation 1: amplitude ∝ frequency^−falloff.
+
+    `lowest` is the frequency, in cycles a tile, below which amplitudes fade out.
+    """
+    generator = np.random.default_rng(seed)
+    frequency = _frequency(size)
+    # Only amplitudes above 1/1000 of the strongest are seen, but drawing all keeps it simple;
+    # the order of draws is row by row, so a size has its own pattern.
+    phase = generator.random(frequency.shape, np.float32) * np.float32(2.0 * np.pi)
+    amplitude = frequency ** np.float32(-falloff - 0.5)
+    amplitude *= np.minimum(frequency / np.float32(lowest), 1.0) ** 2
+    amplitude[0, 0] = 0.0
+    spectrum = np.empty(frequency.shape, np.complex64)
+    spectrum.real = amplitude * np.cos(phase)
+    spectrum.imag = amplitude * np.sin(phase)
+    field: Field = np.fft.irfft2(spectrum, s=(size, size)).astype(np.float32)
+    field /= field.std()
+    return field
+
+
+def _smooth(field: Field, cutoff: float = 24.0) -> Field:
+    """The field without detail finer than `cutoff` cycles a tile."""
+    size = len(field)
+    spectrum = np.fft.rfft2(field)
+    spectrum *= np.exp(-((_frequency(size) / np.float32(cutoff)) ** 2))
+    smoothed: Field = np.fft.irfft2(spectrum, s=(size, size)).astype(np.float32)
+    return smoothed
+
+
+def grid(size: int) -> tuple[Field, Field]:
+    """Texel centres u [1, size] and v [size, 1] in 0…1; v runs down."""
+    line = (np.arange(size, dtype=np.float32) + np.float32(0.5)) / np.float32(size)
+    return line[None, :], line[:, None]
+
+
+def mix(first: NDArray[np.float32], second: NDArray[np.float32], share: Field) -> Field:
+    """Colours or fields blended: 0 gives the first, 1 the second; colours are [3] or [y, x, 3]."""
+    weight = np.clip(share, 0.0, 1.0)[..., None]
+    mixed: Field = (first * (1.0 - weight) + second * weight).astype(np.float32)
+    return mixed
+
+
+def rgb(code: str) -> NDArray[np.float32]:
+    """An sRGB colour from six hexadecimal digits, [3] in 0…1."""
+    return np.frombuffer(bytes.fromhex(code), np.uint8).astype(np.float32) / np.float32(255.0)
