@@ -17,6 +17,7 @@ BIN = $(VENV)/bin
 .DEFAULT_GOAL = demo
 
 demo: system $(VENV)/base.stamp
+	@mkdir -p out
 	$(BIN)/lfd-render demo out/demo
 
 test: system-test $(VENV)/dev.stamp

@@ -190,7 +190,8 @@ def _install(packages: Sequence[str], privilege: Sequence[str]) -> bool:
     return _run([*apt, "apt-get", "update", "-q", *_PATIENCE]) and _run([*install, "-q"])
 
 
-def _advice(packages: Sequence[str]) -> str:
+def advice(packages: Sequence[str]) -> str:
+    """What a person does to get packages, on this system."""
     if shutil.which("apt-get"):
         return f"Install it with:\n  {apt_command(packages)}"
     if platform.system() == "Darwin":
@@ -226,11 +227,12 @@ def _report(missing: dict[str, str], requests: Sequence[str]) -> int:
     for part, problem in missing.items():
         print(f"{part} is missing: {problem}", file=sys.stderr)
     if missing:
-        print(_advice(_packages(missing)), file=sys.stderr)
+        print(advice(_packages(missing)), file=sys.stderr)
     return int(any(part in requests for part in missing))
 
 
 if __name__ == "__main__":
+    os.environ.setdefault("EGL_LOG_LEVEL", "fatal")  # what is missing is said once, below
     if sys.argv[1] == "--check":
         sys.exit(_report(_missing(sys.argv[2:]), sys.argv[2:]))
     sys.exit(main(sys.argv[1:]))

@@ -1,4 +1,4 @@
-"""Imports run one way; the arrows are those of the README's architecture line.
+"""Imports run one way, along these arrows.
 
     errors ← display, scene, quality ← reference
     display, scene ← gpu ← passes ← techniques, panel ← renderer ← bench, engine, cli, service

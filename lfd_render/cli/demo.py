@@ -1,0 +1,65 @@
+"""`lfd-render demo`: a panel image, and what three eyes before the display see of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from lfd_render.cli import options
+from lfd_render.cli.console import progress, say
+from lfd_render.cli.inputs import load_display, load_scene, place_camera
+from lfd_render.cli.outputs import check_folder_output, make_folder
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+SCENE = "builtin:spheres"
+# Where the eyes are, in cones from the middle.
+EYES = {"left": -0.375, "centre": 0.0, "right": 0.375}
+GAP_PX = 8
+PAPER = 255
+
+
+def demo(
+    output: Annotated[str, typer.Argument(metavar="FOLDER", help="Where the pictures go.")] = "out",
+    *,
+    scene: Annotated[str, typer.Option(help="Scene to show.")] = SCENE,
+    display: options.DisplayOption = options.DEFAULT_DISPLAY,
+    device: options.DeviceOption = "auto",
+) -> None:
+    """Render a scene and look at it from the left, the centre and the right."""
+    options.check_device(device)
+    folder = check_folder_output(output)
+    profile = load_display(display)
+    with progress("Loading"):
+        loaded = load_scene(scene)
+        window = place_camera(loaded, profile)
+
+    from lfd_render.panel.look import look  # noqa: PLC0415 (keeps --help quick)
+    from lfd_render.panel.picture import write_png  # noqa: PLC0415
+    from lfd_render.renderer import Renderer  # noqa: PLC0415
+
+    with progress("Rendering"), Renderer(device=device) as renderer:
+        eia = renderer.render(loaded, profile, window)
+    with progress("Looking"):
+        seen = {eye: look(eia.pixels, profile, at * profile.cone_rad) for eye, at in EYES.items()}
+
+    make_folder(folder)
+    eia.save(folder / "eia.png")
+    for eye, picture in seen.items():
+        write_png(folder / f"{eye}.png", picture)
+    write_png(folder / "preview.png", side_by_side(list(seen.values())))
+    height, width = eia.pixels.shape[:2]
+    say(f"{folder}/eia.png: the panel image, {width} × {height}, on {eia.report['renderer']}")
+    say(f"{folder}/preview.png: seen from the left, centre and right of the display")
+
+
+def side_by_side(pictures: list[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    """Pictures of one size, uint8 [y, x, 3] each, in a row with gaps."""
+    import numpy as np  # noqa: PLC0415 (keeps --help quick)
+
+    gap = np.full((pictures[0].shape[0], GAP_PX, 3), PAPER, np.uint8)
+    parts = [part for picture in pictures for part in (gap, picture)][1:]
+    return np.concatenate(parts, axis=1)

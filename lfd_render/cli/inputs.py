@@ -1,0 +1,101 @@
+"""Scene, display and camera as the command line names them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lfd_render.cli.console import warn
+from lfd_render.cli.options import Spacing
+from lfd_render.errors import SceneError, UsageError
+
+if TYPE_CHECKING:
+    from lfd_render.display import Camera, DisplayProfile
+    from lfd_render.scene import Scene, SceneCamera
+
+
+def load_display(name_or_path: str, spacing: Spacing | None = None) -> DisplayProfile:
+    """The display's profile, with another eye spacing if asked; raises ProfileError."""
+    from lfd_render.display import DisplayProfile  # noqa: PLC0415 (keeps --help quick)
+
+    profile = DisplayProfile.load(name_or_path)
+    if profile.template:
+        warn(
+            f"display '{profile.name}': its figures are a model's or assumed; "
+            "a real unit needs its own calibration"
+        )
+    if spacing is None:
+        return profile
+    viewing = profile.viewing.model_copy(update={"spacing": spacing.value})
+    return profile.model_copy(update={"viewing": viewing})
+
+
+def load_scene(source: str) -> Scene:
+    """The scene; raises SceneError or ResourceError."""
+    from lfd_render.scene import Scene  # noqa: PLC0415 (keeps --help quick)
+
+    scene = Scene.load(source)
+    for warning in scene.warnings:
+        warn(f"{source}: {warning}")
+    return scene
+
+
+def place_camera(
+    scene: Scene,
+    profile: DisplayProfile,
+    *,
+    camera: str | None = None,
+    focus_distance: float | None = None,
+    yaw_deg: float = 0.0,
+    depth_scale: float = 1.0,
+) -> Camera:
+    """Where the window stands: as asked, else the scene's own window, else framed.
+
+    Raises SceneError for a camera that cannot be read, UsageError for options out of range.
+    """
+    if not math.isfinite(yaw_deg):
+        raise UsageError(f"--yaw: {yaw_deg}; give a finite number of degrees")
+    if not 0 < depth_scale < math.inf:
+        raise UsageError(f"--depth-scale: {depth_scale}; give a number above 0")
+    if focus_distance is not None and not 0 < focus_distance < math.inf:
+        raise UsageError(f"--focus-distance: {focus_distance}; give a length above 0")
+    chosen = _chosen_camera(scene, profile, camera, focus_distance)
+    return chosen.turned(math.radians(yaw_deg)).with_depth_scale(depth_scale)
+
+
+def _chosen_camera(
+    scene: Scene, profile: DisplayProfile, camera: str | None, focus_distance: float | None
+) -> Camera:
+    from lfd_render.display import Camera  # noqa: PLC0415 (keeps --help quick)
+
+    named = next((c for c in scene.cameras if c.name == camera), None)
+    is_file = camera is not None and Path(camera).is_file()
+    if focus_distance is not None and (named is None or is_file):
+        raise UsageError("--focus-distance: goes with --camera NAME, a camera of the scene")
+    if camera is not None and is_file:
+        return Camera.load(camera)
+    if named is not None:
+        distance = focus_distance or _distance_to_middle(scene, named)
+        return Camera.from_view(named.world_from_camera, named.yfov_rad, distance)
+    if camera is not None:
+        names = ", ".join(f"'{c.name}'" for c in scene.cameras) or "none"
+        raise SceneError(
+            f"--camera: '{camera}'; no such file, and the scene's cameras are: {names}"
+        )
+    if scene.default_camera is not None:
+        return Camera.from_json_dict(dict(scene.default_camera))
+    return Camera.frame(*scene.bounds(), profile)
+
+
+def _distance_to_middle(scene: Scene, camera: SceneCamera) -> float:
+    """Distance from a camera, along its view, to the middle of the scene's box."""
+    low, high = scene.bounds()
+    backward = camera.world_from_camera[:3, 2]
+    to_middle = (low + high) / 2 - camera.world_from_camera[:3, 3]
+    distance = float(-(to_middle @ backward) / math.sqrt(float(backward @ backward)))
+    if not distance > 0:
+        raise UsageError(
+            f"--camera: '{camera.name}'; the scene's middle is behind it, give --focus-distance"
+        )
+    return distance

@@ -1,0 +1,81 @@
+"""Where results go: checked before any rendering, written whole or not at all."""
+
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from lfd_render.cli.console import writing_stdout
+from lfd_render.errors import OutputError, UsageError
+
+STDOUT = "-"
+PICTURE_SUFFIXES = (".png",)
+
+
+def check_picture_output(output: str, json: bool = False) -> None:
+    """Raise before work starts if a picture cannot be written to this file, or to stdout.
+
+    OutputError for a place that cannot be written, UsageError for a name that makes no sense.
+    """
+    if output == STDOUT:
+        if json:
+            raise UsageError("-o -: stdout carries either the picture or --json's object; drop one")
+        if sys.stdout.isatty():
+            raise UsageError("-o -: stdout is a terminal; send the picture to a file or a pipe")
+        return
+    path = Path(output)
+    if path.is_dir():
+        raise OutputError(f"{output}: is a folder; give a file name")
+    if path.suffix.lower() not in PICTURE_SUFFIXES:
+        known = " or ".join(PICTURE_SUFFIXES)
+        raise UsageError(f"{output}: suffix '{path.suffix}'; give {known}, or - for stdout")
+    _check_folder(path.parent)
+
+
+def check_folder_output(output: str) -> Path:
+    """The folder for results, which need not exist while the one above it can be written.
+
+    Raises OutputError. Nothing is made yet, so that a failure leaves nothing behind.
+    """
+    folder = Path(output)
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"{output}: is a file; give a folder")
+    _check_folder(folder if folder.exists() else folder.absolute().parent)
+    return folder
+
+
+def make_folder(folder: Path) -> None:
+    """Make the folder if it is not there; raises OutputError."""
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: {error.strerror}; choose another folder") from error
+
+
+def write_picture(output: str, save: Callable[[Path], object]) -> None:
+    """Let `save` write the picture's file, or send that file to stdout."""
+    if output != STDOUT:
+        save(Path(output))
+        return
+    with tempfile.TemporaryDirectory(prefix="lfd-render-") as folder:
+        file = Path(folder) / f"picture{PICTURE_SUFFIXES[0]}"
+        save(file)
+        with file.open("rb") as picture, writing_stdout():
+            shutil.copyfileobj(picture, sys.stdout.buffer)
+
+
+def _check_folder(folder: Path) -> None:
+    """Raise OutputError unless a file can be made in the folder."""
+    if not folder.is_dir():
+        raise OutputError(f"{folder}: no such folder; make it first, or choose another")
+    try:
+        # Asking for permissions would miss read-only and full file systems.
+        descriptor, name = tempfile.mkstemp(prefix=".lfd-render-", dir=folder)
+    except OSError as error:
+        raise OutputError(
+            f"{folder}: {error.strerror}; choose a folder that can be written"
+        ) from error
+    os.close(descriptor)
+    os.unlink(name)

@@ -1,0 +1,93 @@
+"""`lfd-render render`: a scene becomes the panel image of a display."""
+
+from typing import Annotated
+
+import typer
+
+from lfd_render.cli import options
+from lfd_render.cli.console import Stopwatch, print_json, progress, say
+from lfd_render.cli.inputs import load_display, load_scene, place_camera
+from lfd_render.cli.outputs import check_picture_output, write_picture
+
+
+def render(
+    scene: options.SceneArgument,
+    *,
+    output: Annotated[
+        str, typer.Option("--output", "-o", metavar="FILE", help="PNG to write; - for stdout.")
+    ],
+    display: options.DisplayOption = options.DEFAULT_DISPLAY,
+    views: options.ViewsOption = None,
+    view_size: options.ViewSizeOption = None,
+    technique: options.TechniqueOption = options.Technique.LFDPR,
+    preset: options.PresetOption = options.Preset.DEFAULT,
+    camera: options.CameraOption = None,
+    focus_distance: options.FocusDistanceOption = None,
+    yaw: options.YawOption = 0.0,
+    depth_scale: options.DepthScaleOption = 1.0,
+    spacing: options.SpacingOption = None,
+    seed: options.SeedOption = 0,
+    repeat: Annotated[
+        int, typer.Option(min=1, help="Render N frames with a moving camera; time their median.")
+    ] = 1,
+    device: options.DeviceOption = "auto",
+    json: options.JsonOption = False,
+) -> None:
+    """Render SCENE into the panel image (EIA) of a display."""
+    size = options.parse_view_size(view_size)
+    options.check_device(device)
+    check_picture_output(output, json)
+
+    watch = Stopwatch()
+    with watch.span("load"), progress("Loading"):
+        profile = load_display(display, spacing)
+        loaded = load_scene(scene)
+        window = place_camera(
+            loaded,
+            profile,
+            camera=camera,
+            focus_distance=focus_distance,
+            yaw_deg=yaw,
+            depth_scale=depth_scale,
+        )
+
+    from lfd_render.renderer import Renderer  # noqa: PLC0415 (keeps --help quick)
+
+    with progress("Rendering"), Renderer(device=device) as renderer:
+        eia = renderer.render(
+            loaded,
+            profile,
+            window,
+            views=views,
+            view_size=size,
+            technique=technique.value,
+            preset=preset.value,
+            seed=seed,
+            repeat=repeat,
+        )
+    with watch.span("encode"), progress("Writing"):
+        write_picture(output, eia.save)
+
+    report = dict(eia.report)
+    timings_ms = dict(report.pop("timings_ms"))
+    encode_ms = watch.timings_ms.pop("encode")
+    watch.timings_ms |= timings_ms | {"encode": encode_ms}
+    result = {
+        "output": output,
+        "display": profile.name,
+        "technique": technique.value,
+        "preset": preset.value,
+        "views": views or profile.views,
+        "seed": seed,
+        "repeat": repeat,
+        **report,
+        "camera": window.to_json_dict(),
+        "timings_ms": watch.finish(),
+    }
+    if json:
+        print_json(result)
+    height, width = eia.pixels.shape[:2]
+    say(
+        f"{output}: {width} × {height}, {result['views']} views by {technique.value}, "
+        f"a frame in {timings_ms['frame']:.0f} ms on {report['renderer']}"
+    )
