@@ -27,7 +27,7 @@ def _unwrap(value: Any) -> Any:
 
 
 Number = Annotated[float, BeforeValidator(_unwrap)]
-Positive = Annotated[float, BeforeValidator(_unwrap), Field(gt=0, le=1e6)]
+Positive = Annotated[float, Field(gt=0, le=1e6), BeforeValidator(_unwrap)]
 
 
 class _Cell(StrictModel, extra="ignore"):

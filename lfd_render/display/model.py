@@ -80,9 +80,10 @@ class Lens(StrictModel):
 
 def _one_of_each(schema: dict[str, Any]) -> None:
     """Say in the JSON Schema what `resolve_lens` asks for."""
+    schema["dependentRequired"] = {"pitch_mm": ["gap_mm"]}
     schema["allOf"] = [
         {"anyOf": [{"required": ["drift"]}, {"required": ["tilt_deg"]}]},
-        {"anyOf": [{"required": ["lens_count"]}, {"required": ["pitch_mm", "gap_mm"]}]},
+        {"anyOf": [{"required": ["lens_count"]}, {"required": ["pitch_mm"]}]},
     ]
 
 

@@ -43,7 +43,10 @@ def look(
             f"panel image is {eia.dtype} {list(eia.shape)}; the display '{profile.name}' takes "
             f"uint8 [{height}, {width}, 3]"
         )
-    grid = ViewGrid.lens(profile, ViewGrid.default_rows(profile, views or profile.views))
+    count = profile.views if views is None else views
+    if count < 1:
+        raise UsageError(f"views is {count}; it should be at least 1")
+    grid = ViewGrid.lens(profile, ViewGrid.default_rows(profile, count))
     columns = max(1, round(grid.rows * profile.size_mm[0] / profile.size_mm[1]))
     out_columns, out_rows = size_px or (columns, grid.rows)
     if min(out_columns, out_rows) < 1:
@@ -51,8 +54,8 @@ def look(
 
     x, y, miss = nearest_subpixels(profile, grid, 0.5 + slot_from_angle(angle_rad, profile))
     seen = _LINEAR_FROM_CODE[eia[y, x, np.arange(3)]]
-    # Lenses cut off by the panel's edge may lack the subpixel in line with the eye.
-    upright = _upright(seen, miss <= 2 * profile.lens_count / width, grid, out_columns)
+    # A lens cut off by the panel's edge may have no subpixel within a view of the eye's.
+    upright = _upright(seen, miss * count <= 1, grid, out_columns)
     if out_rows != grid.rows:
         upright = _resample_rows(upright, out_rows)
     return _code_from_linear(upright)

@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -66,17 +66,17 @@ def _opened(path: Path) -> Iterator[Image.Image]:
     """A picture of an accepted kind and size; whatever goes wrong is a PictureError."""
     kinds = ", ".join(READABLE)
     try:
-        with warnings.catch_warnings():
-            # Pillow's own size warning; the limit below is stricter and an error.
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            opened = Image.open(path, formats=READABLE)
-        with opened as image:
-            width, height = image.size
-            if width * height > MAX_PIXELS:
-                raise PictureError(
-                    f"{path}: has {width} x {height} pixels; at most {MAX_PIXELS} can be read"
-                )
-            image.load()
+        with ExitStack() as stack:
+            with warnings.catch_warnings():
+                # Pillow warns of large and of slightly damaged files; ours are errors or fine.
+                warnings.simplefilter("ignore")
+                image = stack.enter_context(Image.open(path, formats=READABLE))
+                width, height = image.size
+                if width * height > MAX_PIXELS:
+                    raise PictureError(
+                        f"{path}: has {width} x {height} pixels; at most {MAX_PIXELS} can be read"
+                    )
+                image.load()
             yield image
     except UnidentifiedImageError as cause:
         raise PictureError(f"{path}: is not a picture of a known kind; give {kinds}") from cause
