@@ -9,6 +9,7 @@ from urllib.parse import parse_qsl
 from lfd_render.errors import SceneError
 
 from .model import Scene
+from .procedural.chart import chart
 from .procedural.gallery import gallery
 from .procedural.spheres import spheres
 
@@ -27,6 +28,7 @@ class Builtin:
 _TRIANGLES = (1_000, 10_000_000)
 
 BUILTINS: dict[str, Builtin] = {
+    "chart": Builtin(chart, {"triangles": _TRIANGLES}, {"triangles": 100_000}),
     "gallery": Builtin(
         gallery,
         {"triangles": _TRIANGLES, "textures": (16, 4096)},

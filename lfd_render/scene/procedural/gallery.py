@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 from ..model import Image, Instance, Material, Scene, TextureSlot
 from . import materials as paint
 from .grid import Surface, SurfaceMap, tessellate
-from .shapes import frame, lathe, plane, sphere, torus_knot
+from .shapes import frame, lathe, plane, rounded, sphere, torus_knot
 from .textures import TextureSet, to_pixels
 
-_HALF_WIDTH, _FLOOR, _CEILING, _BACK, _FRONT = 4.4, -1.65, 2.35, -5.6, 4.4
-_HEIGHT, _DEPTH = _CEILING - _FLOOR, _FRONT - _BACK
+_HALF_WIDTH, _FLOOR, _CEILING, _BACK, _FRONT = 4.4, -1.65, 2.0, -5.6, 4.4
+_HEIGHT = _CEILING - _FLOOR
+_OVERLAP = 0.05
+_STAND = _FLOOR - 0.01  # things sink in a little, so that no two faces coincide
 _WINDOW_HEIGHT = 3.0
 
 _SETS: dict[str, Callable[[int], TextureSet]] = {
@@ -88,19 +90,22 @@ def gallery(triangles: int, textures: int) -> Scene:
 
 
 def _add_room(hall: _Hall) -> None:
-    w, d, h = _HALF_WIDTH, _DEPTH, _HEIGHT
-    floor = plane((-w, _FLOOR, _BACK), (2 * w, 0, 0), (0, 0, d))
+    # Each surface reaches a little beyond the next, so that no gap opens along their edges.
+    w, low, high = _HALF_WIDTH + _OVERLAP, _FLOOR - _OVERLAP, _CEILING + _OVERLAP
+    back, front = _BACK - _OVERLAP, _FRONT + _OVERLAP
+    d, h = front - back, high - low
+    floor = plane((-w, _FLOOR, back), (2 * w, 0, 0), (0, 0, d))
     hall.add(_wall("floor", "floor", floor, (2 * w, d), 2.0))
-    ceiling = plane((-w, _CEILING, _FRONT), (2 * w, 0, 0), (0, 0, -d), _coffers)
+    ceiling = plane((-w, _CEILING, front), (2 * w, 0, 0), (0, 0, -d), _coffers)
     hall.add(_wall("ceiling", "plaster", ceiling, (2 * w, d), 2.0, detail=1.5))
-    back = plane((-w, _CEILING, _BACK), (2 * w, 0, 0), (0, -h, 0), _niche)
-    hall.add(_wall("back wall", "damask", back, (2 * w, h), 1.6, detail=2.0))
-    left = plane((-w, _CEILING, _FRONT), (0, 0, -d), (0, -h, 0), _panels)
+    far = plane((-w, high, _BACK), (2 * w, 0, 0), (0, -h, 0), _niche)
+    hall.add(_wall("back wall", "damask", far, (2 * w, h), 1.6, detail=2.0))
+    left = plane((-_HALF_WIDTH, high, front), (0, 0, -d), (0, -h, 0), _panels)
     hall.add(_wall("left wall", "damask", left, (d, h), 1.6))
-    right = plane((w, _CEILING, _BACK), (0, 0, d), (0, -h, 0), _panels)
+    right = plane((_HALF_WIDTH, high, back), (0, 0, d), (0, -h, 0), _panels)
     hall.add(_wall("right wall", "damask", right, (d, h), 1.6))
-    front = plane((w, _CEILING, _FRONT), (-2 * w, 0, 0), (0, -h, 0), _panels)
-    hall.add(_wall("front wall", "damask", front, (2 * w, h), 1.6, detail=0.2))
+    near = plane((w, high, _FRONT), (-2 * w, 0, 0), (0, -h, 0), _panels)
+    hall.add(_wall("front wall", "damask", near, (2 * w, h), 1.6, detail=0.2))
 
 
 def _wall(
@@ -142,10 +147,10 @@ def _coffers(u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[np.float
 
 def _wainscot(v: NDArray[np.float32]) -> NDArray[np.float32]:
     """Skirting, dado rail and cornice, in metres from the wall; v runs down its height."""
-    y = v * np.float32(_HEIGHT)
+    y = v * np.float32(_HEIGHT + 2 * _OVERLAP) - np.float32(_OVERLAP)
     cornice = np.float32(0.16) * (1 - _step(y, 0.10, 0.14))
-    rail = np.float32(0.05) * _step(y, 2.92, 0.03) * (1 - _step(y, 3.02, 0.04))
-    skirting = np.float32(0.06) * _step(y, 3.78, 0.05)
+    rail = np.float32(0.05) * _step(y, 2.62, 0.03) * (1 - _step(y, 2.72, 0.04))
+    skirting = np.float32(0.06) * _step(y, 3.43, 0.05)
     relief: NDArray[np.float32] = cornice + rail + skirting
     return relief
 
@@ -162,12 +167,13 @@ def _panels(u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[np.float3
 
 
 def _niche(u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A half-round arched niche, 0.9 m deep, in the middle of the wall, with a moulded edge."""
-    x = (u - np.float32(0.5)) * np.float32(2 * _HALF_WIDTH)
-    y = np.float32(_CEILING) - v * np.float32(_HEIGHT)
+    """A half-round arched niche, 0.9 m deep over a sill, in the middle of the wall."""
+    x = (u - np.float32(0.5)) * np.float32(2 * (_HALF_WIDTH + _OVERLAP))
+    y = np.float32(_CEILING + _OVERLAP) - v * np.float32(_HEIGHT + 2 * _OVERLAP)
     above = np.maximum(y - np.float32(0.55), 0.0)
     radius = np.hypot(x, above)
     hollow = np.float32(0.9) * np.sqrt(np.clip(1 - (radius / np.float32(1.05)) ** 2, 0.0, 1.0))
+    hollow *= _step(y, -1.32, 0.04)
     rim = np.float32(0.06) * (_step(radius, 1.05, 0.03) - _step(radius, 1.22, 0.05))
     relief: NDArray[np.float32] = _wainscot(v) * _step(radius, 1.05, 0.02) + rim - hollow
     return relief
@@ -213,14 +219,14 @@ def _turned(
 
 
 def _add_columns(hall: _Hall) -> None:
-    top = _HEIGHT
+    top = _HEIGHT + 0.03
     profile = [
         (0.0, top), (0.42, top), (0.42, top - 0.12), (0.34, top - 0.20), (0.30, top - 0.32),
         (0.25, top - 0.36), (0.29, 0.42), (0.37, 0.34), (0.33, 0.26), (0.42, 0.16),
         (0.42, 0.0), (0.0, 0.0),
     ]  # fmt: skip
     column = _turned("column", "marble", profile, flutes=20, least=(4, 4), detail=3.0)
-    places = [_at(x, _FLOOR, z) for z in (-4.6, -2.7, -0.8, 3.0) for x in (-3.35, 3.35)]
+    places = [_at(x, _STAND, z) for z in (-4.6, -2.7, -0.8, 3.0) for x in (-3.35, 3.35)]
     hall.add(column, *places)
 
 
@@ -233,15 +239,15 @@ def _plinth(hall: _Hall, height: float, half: float, *places: NDArray[np.float64
 
 
 def _add_sculptures(hall: _Hall) -> None:
-    _plinth(hall, 0.86, 0.34, _at(-1.35, _FLOOR, 0.42, 20), _at(1.45, _FLOOR, 0.20, -15))
-    hall.add(_knot("bronze knot", "bronze", (2, 3), 0.46, 0.13), _at(-1.35, -0.13, 0.42, 25))
+    _plinth(hall, 0.86, 0.34, _at(-1.35, _STAND, 0.42, 20), _at(1.45, _STAND, 0.20, -15))
+    hall.add(_knot("bronze knot", "bronze", (2, 3), 0.46, 0.13), _at(-1.35, -0.25, 0.42, 25))
     bumpy = _round("gilt planet", "gilt", 0.46, bumps=_bumps)
-    hall.add(bumpy, _at(1.45, -0.31, 0.20))
-    _plinth(hall, 0.62, 0.48, _at(0.0, _FLOOR, -1.7, 45))
-    hall.add(_knot("great knot", "gilt", (3, 4), 0.72, 0.12), _at(0.0, -0.16, -1.7, -20))
-    _plinth(hall, 0.95, 0.30, _at(-2.2, _FLOOR, -3.2), _at(2.2, _FLOOR, -3.2))
-    hall.add(_vase(), _at(-2.2, _FLOOR + 0.95, -3.2), _at(2.2, _FLOOR + 0.95, -3.2))
-    hall.add(_figure(), _at(0.0, _FLOOR + 0.0, -5.75))
+    hall.add(bumpy, _at(1.45, -0.345, 0.20))
+    _plinth(hall, 0.52, 0.44, _at(0.0, _STAND, -1.2, 45))
+    hall.add(_knot("great knot", "gilt", (3, 4), 0.60, 0.10), _at(0.0, -0.455, -1.2, -20))
+    _plinth(hall, 0.95, 0.30, _at(-2.75, _STAND, -1.75), _at(2.75, _STAND, -1.75))
+    hall.add(_vase(), _at(-2.75, _STAND + 0.945, -1.75), _at(2.75, _STAND + 0.945, -1.75))
+    hall.add(_figure(), _at(0.0, _STAND, -5.75))
 
 
 def _knot(
@@ -297,17 +303,17 @@ def _vase() -> Surface:
         (0.0, 0.72), (0.09, 0.72), (0.13, 0.76), (0.11, 0.68), (0.08, 0.58), (0.17, 0.48),
         (0.22, 0.38), (0.20, 0.26), (0.12, 0.12), (0.09, 0.06), (0.13, 0.0), (0.0, 0.0),
     ]  # fmt: skip
-    return _turned("vase", "bronze", profile, detail=6.0)
+    return _turned("vase", "bronze", rounded(profile), detail=6.0)
 
 
 def _figure() -> Surface:
     """A turned marble figure on its own drum, for the niche."""
     profile = [
-        (0.0, 2.30), (0.11, 2.27), (0.16, 2.18), (0.15, 2.06), (0.08, 1.97), (0.10, 1.90),
-        (0.26, 1.84), (0.29, 1.70), (0.22, 1.40), (0.19, 1.25), (0.27, 0.95), (0.36, 0.55),
-        (0.40, 0.50), (0.50, 0.46), (0.50, 0.06), (0.56, 0.0), (0.0, 0.0),
+        (0.0, 2.92), (0.09, 2.89), (0.14, 2.79), (0.13, 2.66), (0.07, 2.57), (0.09, 2.51),
+        (0.25, 2.45), (0.29, 2.31), (0.22, 2.00), (0.17, 1.82), (0.24, 1.50), (0.33, 1.08),
+        (0.37, 1.02), (0.46, 0.98), (0.46, 0.10), (0.54, 0.0), (0.0, 0.0),
     ]  # fmt: skip
-    return _turned("figure", "marble", profile, detail=6.0)
+    return _turned("figure", "marble", rounded(profile))
 
 
 def _add_pictures(hall: _Hall) -> None:
@@ -315,8 +321,8 @@ def _add_pictures(hall: _Hall) -> None:
     offset = 0.09  # clear of the wall's mouldings
     side = _HALF_WIDTH - offset
     places = [
-        _at(-2.75, y, _BACK + offset),
-        _at(2.75, y, _BACK + offset),
+        _at(-2.25, y, _BACK + offset),
+        _at(2.25, y, _BACK + offset),
         _at(-side, y, -3.65, 90),
         _at(side, y, -3.65, -90),
         _at(-side, y, -1.75, 90),
@@ -347,10 +353,10 @@ def _add_pictures(hall: _Hall) -> None:
 def _add_lamps(hall: _Hall) -> None:
     spots = [(x, z) for z in (-3.6, -1.2) for x in (-1.5, 1.5)]
     globe = _round("lamp", "lamp", 0.17, uv_scale=(1.0, 1.0), least=(5, 3))
-    hall.add(globe, *(_at(x, 1.42, z) for x, z in spots))
-    rod = [(0.0, 0.85), (0.10, 0.84), (0.012, 0.78), (0.012, 0.06), (0.05, 0.0), (0.0, 0.0)]
+    hall.add(globe, *(_at(x, 1.15, z) for x, z in spots))
+    rod = [(0.0, 0.75), (0.10, 0.74), (0.012, 0.68), (0.012, 0.06), (0.05, 0.0), (0.0, 0.0)]
     surface = _turned("lamp rod", "gilt", rod, detail=8.0, least=(3, 3), tile=0.3)
-    hall.add(surface, *(_at(x, 1.55, z) for x, z in spots))
+    hall.add(surface, *(_at(x, 1.28, z) for x, z in spots))
 
 
 def _materials(size: int) -> tuple[tuple[Material, ...], tuple[Image, ...]]:

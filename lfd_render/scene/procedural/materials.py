@@ -28,22 +28,30 @@ def floor_tiles(size: int) -> TextureSet:
 
 
 def damask(size: int) -> TextureSet:
-    """Deep red wall cloth with a woven ornament that is smoother than its ground."""
+    """Deep red wall cloth: staggered rosettes in a net of lines, smoother than the ground."""
     u, v = grid(size)
-    count = np.float32(3.0)
-    x, y = u * count, v * count
-    petals = (
-        np.cos(2 * _PI * x) + np.cos(2 * _PI * y) + 0.7 * np.cos(4 * _PI * x) * np.cos(2 * _PI * y)
-    )
-    petals = petals + 0.6 * np.cos(2 * _PI * (x + y)) * np.cos(2 * _PI * (x - y))
-    ornament = np.clip(2.5 * np.cos(1.9 * petals), -1.0, 1.0) * 0.5 + 0.5
-    thread = np.sin(2 * _PI * 128 * v) * np.float32(0.5) + np.sin(2 * _PI * 128 * u) * 0.5
+    across, down = u * 3, v * 2
+    net = np.cos(2 * _PI * across) + np.cos(2 * _PI * down)
+    net = net + 0.5 * np.cos(4 * _PI * across) * np.cos(2 * _PI * down)
+    lines = np.maximum(0.14 - np.abs(np.abs(net) - 0.28), 0.0) * 18
+    ornament = np.clip(lines + _rosettes(across, down) + _rosettes(across + 0.5, down + 0.5), 0, 1)
+    thread = np.sin(2 * _PI * 160 * v) * np.float32(0.5) + np.sin(2 * _PI * 160 * u) * 0.5
     worn = noise(size, 21, 1.4)
-    color = mix(rgb("5c1020"), rgb("8e2a33"), ornament + 0.08 * worn)
-    color *= (1.0 + 0.05 * thread + 0.02 * worn)[..., None]
-    height = 0.0022 * ornament + 0.00025 * thread + 0.00005 * worn
-    roughness = 0.85 - 0.3 * ornament + 0.03 * worn
-    return TextureSet("damask", color, height.astype(np.float32), roughness.astype(np.float32))
+    color = mix(rgb("6b1521"), rgb("93373a"), 0.85 * ornament + 0.07 * worn)
+    color *= (1.0 + 0.04 * thread + 0.02 * worn)[..., None]
+    height = (0.0009 * ornament + 0.00015 * thread + 0.00005 * worn).astype(np.float32)
+    roughness = (0.85 - 0.28 * ornament + 0.03 * worn).astype(np.float32)
+    return TextureSet("damask", color, height, roughness)
+
+
+def _rosettes(across: Field, down: Field) -> Field:
+    """An eight-petalled flower with a ring in each unit cell, 1 inside and 0 outside."""
+    x, y = across % 1 - np.float32(0.5), (down % 1 - np.float32(0.5)) * np.float32(1.3)
+    radius, angle = np.hypot(x, y), np.arctan2(y, x)
+    petals = np.float32(0.21) * (np.float32(0.72) + np.float32(0.28) * np.cos(8 * angle)) - radius
+    ring = np.float32(0.012) - np.abs(radius - np.float32(0.075))
+    shape: Field = np.clip(70 * petals, 0, 1) - np.clip(120 * ring, 0, 1)
+    return shape
 
 
 def plaster(size: int) -> TextureSet:
@@ -83,13 +91,11 @@ def bronze(size: int) -> TextureSet:
 
 
 def gilt(size: int) -> TextureSet:
-    """Hammered gold leaf: a lattice of shallow dents and a little wear."""
-    u, v = grid(size)
-    count = np.float32(16.0)
-    dents = np.abs(np.sin(_PI * count * u) * np.sin(_PI * count * v)).astype(np.float32)
-    worn = noise(size, 71, 1.6)
-    color = mix(rgb("f2cf7e"), rgb("b98832"), 0.35 + 0.22 * worn)
-    return TextureSet("gilt", color, 0.004 * dents + 0.0004 * worn, 0.26 + 0.07 * worn, 1.0)
+    """Gold leaf over hammered metal: shallow dents without order, and a little wear."""
+    dents: Field = np.abs(noise(size, 71, 3.5, 26.0))
+    worn = noise(size, 72, 1.6)
+    color = mix(rgb("f3d283"), rgb("b98832"), 0.3 + 0.2 * worn + 0.1 * dents)
+    return TextureSet("gilt", color, 0.004 * dents, 0.24 + 0.06 * worn, 1.0)
 
 
 def canvas(size: int) -> TextureSet:
@@ -97,7 +103,7 @@ def canvas(size: int) -> TextureSet:
     u, v = grid(size)
     weave = np.sin(2 * _PI * 192 * u) * np.sin(2 * _PI * 192 * v)
     strokes = noise(size, 81, 1.0, 8.0)
-    height = (0.0002 * weave + 0.0006 * strokes).astype(np.float32)
+    height = (0.0002 * weave + 0.0003 * strokes).astype(np.float32)
     color = np.broadcast_to(rgb("d8cdb8"), (size, size, 3))
     return TextureSet("canvas", color, height, 0.42 + 0.05 * strokes)
 

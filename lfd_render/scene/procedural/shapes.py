@@ -45,6 +45,17 @@ def sphere(radius: float, bumps: Relief | None = None) -> SurfaceMap:
     return point
 
 
+def rounded(profile: Sequence[tuple[float, float]], times: int = 3) -> list[tuple[float, float]]:
+    """The corners of a profile cut `times` over (Chaikin 1974), its ends kept."""
+    line = np.array(profile)
+    for _ in range(times):
+        near = 0.75 * line[:-1] + 0.25 * line[1:]
+        far = 0.25 * line[:-1] + 0.75 * line[1:]
+        cut = np.stack((near, far), axis=1).reshape(-1, 2)
+        line = np.concatenate((line[:1], cut[1:-1], line[-1:]))
+    return [(float(r), float(y)) for r, y in line]
+
+
 def lathe(
     profile: Sequence[tuple[float, float]], *, square: bool = False, flutes: int = 0
 ) -> SurfaceMap:

@@ -7,37 +7,39 @@ from numpy.typing import NDArray
 
 from ..model import Image, Instance, Material, Scene, TextureSlot
 from .grid import Surface, tessellate
-from .shapes import sphere
+from .shapes import plane, sphere
+from .textures import grid, mix, rgb, to_pixels
 
-# x, z, radius; name, linear base colour, metallic, roughness. Window height 2, centre y = 0.
-_FLOOR_Y = -0.82
+# x, z, radius; name, linear base colour, metallic, roughness.
+_FLOOR_Y = -0.86
 _BALLS = (
-    (-0.02, 0.10, 0.40, "gold", (1.00, 0.71, 0.29), 1.0, 0.22),
-    (-0.80, -0.18, 0.34, "red lacquer", (0.55, 0.02, 0.02), 0.0, 0.10),
-    (0.80, -0.12, 0.36, "blue satin", (0.03, 0.12, 0.55), 0.0, 0.45),
-    (-0.48, 0.42, 0.20, "chrome", (0.80, 0.81, 0.83), 1.0, 0.06),
-    (0.46, 0.45, 0.19, "copper", (0.95, 0.54, 0.36), 1.0, 0.35),
-    (0.03, 0.55, 0.11, "jade", (0.05, 0.38, 0.17), 0.0, 0.25),
-    (-1.22, 0.20, 0.22, "brushed steel", (0.56, 0.57, 0.58), 1.0, 0.55),
-    (1.25, 0.24, 0.21, "chalk", (0.80, 0.78, 0.74), 0.0, 0.95),
-    (0.42, -0.62, 0.46, "violet", (0.24, 0.05, 0.42), 0.0, 0.30),
+    (0.00, -0.10, 0.50, "gold", (1.00, 0.71, 0.29), 1.0, 0.22),
+    (-0.93, -0.25, 0.42, "red lacquer", (0.50, 0.02, 0.02), 0.0, 0.10),
+    (0.95, -0.20, 0.43, "blue satin", (0.03, 0.12, 0.50), 0.0, 0.45),
+    (-0.50, 0.24, 0.23, "chrome", (0.80, 0.81, 0.83), 1.0, 0.06),
+    (0.52, 0.26, 0.21, "copper", (0.95, 0.54, 0.36), 1.0, 0.35),
+    (0.06, 0.42, 0.13, "jade", (0.05, 0.36, 0.16), 0.0, 0.25),
+    (-1.30, 0.22, 0.21, "brushed steel", (0.56, 0.57, 0.58), 1.0, 0.55),
+    (1.34, 0.20, 0.22, "chalk", (0.80, 0.78, 0.74), 0.0, 0.95),
+    (0.50, -0.95, 0.70, "violet", (0.20, 0.05, 0.36), 0.0, 0.30),
 )
+_GROUND, _BACKDROP = len(_BALLS), len(_BALLS) + 1
+_EDGE_Z = -1.75  # where the ground's checks end and the backdrop begins
+_BEND = 1.2  # radius of the backdrop's sweep from floor to wall
 
 
 def spheres(triangles: int) -> Scene:
-    """Nine spheres on a checkered ground that sweeps up into a backdrop.
+    """Nine spheres on a checkered ground before a backdrop.
 
-    The window is 2 units high round the origin; spheres stand from 0.6 behind to 0.6 before it.
+    The window is 2 units high round the origin; it cuts through the gold sphere.
     """
-    ground = Surface(
-        name="ground",
-        point=_sweep,
-        size=(12.0, 9.0),
-        material=len(_BALLS),
-        uv_scale=(12.0, 9.0),
-        detail=0.05,
-        least=(4, 8),
-    )
+    half, depth = 6.0, 6.0
+    floor = plane((-half, _FLOOR_Y, _EDGE_Z), (2 * half, 0, 0), (0, 0, depth))
+    scale = (1.25 * half, 0.625 * depth)  # a tile of four fields is 1.6 units wide
+    studio = [
+        Surface("ground", floor, (2 * half, depth), _GROUND, uv_scale=scale, detail=0.1),
+        Surface("backdrop", _sweep, (2 * half, 6.0), _BACKDROP, detail=0.05, least=(2, 6)),
+    ]
     balls = [
         Surface(
             name=name,
@@ -50,9 +52,9 @@ def spheres(triangles: int) -> Scene:
         )
         for i, (_, _, radius, name, *_) in enumerate(_BALLS)
     ]
-    surfaces = [*balls, ground]
+    surfaces = [*balls, *studio]
     meshes = tessellate(surfaces, [1] * len(surfaces), triangles)
-    places = [(x, _FLOOR_Y + radius, z) for x, z, radius, *_ in _BALLS] + [(0.0, 0.0, 0.0)]
+    places = [(x, _FLOOR_Y + radius, z) for x, z, radius, *_ in _BALLS] + [(0.0, 0.0, 0.0)] * 2
     return Scene(
         name="spheres",
         meshes=tuple(meshes),
@@ -65,9 +67,15 @@ def spheres(triangles: int) -> Scene:
                 Material(name, (*color, 1.0), metallic, roughness)
                 for _, _, _, name, color, metallic, roughness in _BALLS
             ),
-            Material("ground", metallic=0.0, roughness=0.4, base_color_texture=TextureSlot(0)),
+            Material("ground", metallic=0.0, roughness=0.35, base_color_texture=TextureSlot(0)),
+            Material(
+                "backdrop",
+                metallic=0.0,
+                roughness=0.9,
+                base_color_texture=TextureSlot(1, wrap=("clamp", "clamp")),
+            ),
         ),
-        images=(_checker(),),
+        images=(_checker(), _gradient()),
         default_camera={
             "target": [0.0, 0.0, 0.0],
             "eye_direction": [0.0, 0.0, 1.0],
@@ -80,17 +88,21 @@ def spheres(triangles: int) -> Scene:
 def _sweep(
     u: NDArray[np.float32], v: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """Backdrop from the top down, a quarter turn of radius 1.2, then floor toward the viewer."""
-    radius, top, back = 1.2, 3.0, -2.4
-    wall = top - radius
-    bend = 0.5 * np.pi * radius
-    length = 9.0
-    s = v.astype(np.float64) * length
-    angle = np.clip((s - wall) / radius, 0.0, 0.5 * np.pi)
-    y = _FLOOR_Y + radius * (1.0 - np.sin(angle)) + np.maximum(wall - s, 0.0)
-    z = back + radius * (1.0 - np.cos(angle)) + np.maximum(s - wall - bend, 0.0)
+    """The backdrop from its top down, then a quarter turn that meets the ground."""
+    wall, bend = 3.0, 0.5 * np.pi * _BEND
+    s = v.astype(np.float64) * (wall + bend)
+    angle = np.maximum(s - wall, 0.0) / _BEND
+    y = _FLOOR_Y + _BEND * (1.0 - np.sin(angle)) + np.maximum(wall - s, 0.0)
+    z = _EDGE_Z - _BEND * np.cos(angle)
     x = (u - np.float32(0.5)) * np.float32(12.0)
     return x, y.astype(np.float32), z.astype(np.float32)
+
+
+def _gradient() -> Image:
+    """Backdrop paper, sRGB: a pool of light behind the spheres on slate blue."""
+    u, v = grid(256)
+    light = np.exp(-(((u - 0.5) / 0.16) ** 2) - ((v - 0.72) / 0.22) ** 2).astype(np.float32)
+    return Image("backdrop", to_pixels(mix(rgb("26303d"), rgb("a9b4bd"), light)))
 
 
 def _checker() -> Image:
