@@ -1,10 +1,10 @@
 """Displays: calibration profiles, phase and view maps, rigs, view grids and cameras."""
 
-from .camera import Camera, comfortable_depth_mm
-from .grid import ViewGrid
-from .phase import PhaseTables, view_index
-from .profile import DisplayProfile, shipped_profiles
-from .rig import Rig, eye_from_slot, slot_from_angle
+from lfd_render.display.camera import Camera, comfortable_depth_mm
+from lfd_render.display.grid import ViewGrid
+from lfd_render.display.phase import PhaseTables, view_index
+from lfd_render.display.profile import DisplayProfile, shipped_profiles
+from lfd_render.display.rig import Rig, eye_from_slot, slot_from_angle
 
 __all__ = [
     "Camera",

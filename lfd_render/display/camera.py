@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, ValidationError
 
-from ..errors import SceneError
-from .strict import StrictModel, one_line, read_json_text
+from lfd_render.display.strict import StrictModel, one_line, read_json_text
+from lfd_render.errors import SceneError
 
 if TYPE_CHECKING:
-    from .profile import DisplayProfile
+    from lfd_render.display.profile import DisplayProfile
 
 Float64 = NDArray[np.float64]
 Vec3 = tuple[float, float, float]

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UsageError
+from lfd_render.errors import UsageError
 
 if TYPE_CHECKING:
-    from .profile import DisplayProfile
+    from lfd_render.display.profile import DisplayProfile
 
 Float64 = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ from typing import Annotated, Any
 
 from pydantic import AliasChoices, BeforeValidator, Field, ValidationError
 
-from ..errors import ProfileError
-from .model import ASSUMED_INDEX, KINDS_OF_MODE, SCHEMA
-from .strict import StrictModel, one_line
+from lfd_render.display.model import ASSUMED_INDEX, KINDS_OF_MODE, SCHEMA
+from lfd_render.display.strict import StrictModel, one_line
+from lfd_render.errors import ProfileError
 
 MM_PER_INCH = 25.4
 # The file names neither; the views are the Portrait's 8×6 quilt.

@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from ..errors import ProfileError
-from .strict import StrictModel
+from lfd_render.display.strict import StrictModel
+from lfd_render.errors import ProfileError
 
 SCHEMA: Literal["lfd-display/1"] = "lfd-display/1"
 MAX_VIEWS = 4096

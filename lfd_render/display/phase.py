@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .model import Cells
+from lfd_render.display.model import Cells
 
 if TYPE_CHECKING:
-    from .profile import DisplayProfile
+    from lfd_render.display.profile import DisplayProfile
 
 Float64 = NDArray[np.float64]
 

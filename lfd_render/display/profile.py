@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError, model_validator
 
-from ..data import data_folder
-from ..errors import ProfileError, UsageError
-from .files import replacing
-from .looking_glass import is_visual_json, profile_data
-from .model import (
+from lfd_render.data import data_folder
+from lfd_render.display.files import replacing
+from lfd_render.display.looking_glass import is_visual_json, profile_data
+from lfd_render.display.model import (
     KINDS_OF_MODE,
     MAX_VIEWS,
     SCHEMA,
@@ -29,9 +28,10 @@ from .model import (
     Spacing,
     resolve_lens,
 )
-from .phase import PhaseTables, phase_tables
-from .rig import Rig
-from .strict import one_line, read_json_text
+from lfd_render.display.phase import PhaseTables, phase_tables
+from lfd_render.display.rig import Rig
+from lfd_render.display.strict import one_line, read_json_text
+from lfd_render.errors import ProfileError, UsageError
 
 
 class DisplayProfile(ProfileFields):

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, assert_never
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UsageError
-from .model import MAX_VIEWS, Spacing
+from lfd_render.display.model import MAX_VIEWS, Spacing
+from lfd_render.errors import UsageError
 
 if TYPE_CHECKING:
-    from .profile import DisplayProfile
+    from lfd_render.display.profile import DisplayProfile
 
 Float64 = NDArray[np.float64]
 NEAR_FRACTION = 0.05  # of the viewing distance

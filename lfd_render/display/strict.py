@@ -4,7 +4,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from ..errors import LfdError
+from lfd_render.errors import LfdError
 
 MAX_JSON_BYTES = 4 << 20
 

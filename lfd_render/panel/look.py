@@ -8,8 +8,8 @@ result is resampled to an upright picture.
 import numpy as np
 from numpy.typing import NDArray
 
-from ..display import DisplayProfile, ViewGrid, slot_from_angle
-from ..errors import PictureError, UsageError
+from lfd_render.display import DisplayProfile, ViewGrid, slot_from_angle
+from lfd_render.errors import PictureError, UsageError
 
 Pixels = NDArray[np.uint8]
 Float32 = NDArray[np.float32]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, PngImagePlugin, UnidentifiedImageError
 
-from ..display.files import replacing
-from ..errors import PictureError, UsageError
+from lfd_render.display.files import replacing
+from lfd_render.errors import PictureError, UsageError
 
 Pixels = NDArray[np.uint8]
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import PictureError, UsageError
+from lfd_render.errors import PictureError, UsageError
 
 Pixels = NDArray[np.uint8]
 
