@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lfd_render.cli.console import warn
-from lfd_render.cli.options import Spacing
 from lfd_render.errors import SceneError, UsageError
 
 if TYPE_CHECKING:
@@ -15,8 +14,8 @@ if TYPE_CHECKING:
     from lfd_render.scene import Scene, SceneCamera
 
 
-def load_display(name_or_path: str, spacing: Spacing | None = None) -> DisplayProfile:
-    """The display's profile, with another eye spacing if asked; raises ProfileError."""
+def load_display(name_or_path: str) -> DisplayProfile:
+    """The display's profile; raises ProfileError."""
     from lfd_render.display import DisplayProfile  # noqa: PLC0415 (keeps --help quick)
 
     profile = DisplayProfile.load(name_or_path)
@@ -25,10 +24,7 @@ def load_display(name_or_path: str, spacing: Spacing | None = None) -> DisplayPr
             f"display '{profile.name}': its figures are a model's or assumed; "
             "a real unit needs its own calibration"
         )
-    if spacing is None:
-        return profile
-    viewing = profile.viewing.model_copy(update={"spacing": spacing.value})
-    return profile.model_copy(update={"viewing": viewing})
+    return profile
 
 
 def load_scene(source: str) -> Scene:
@@ -68,6 +64,7 @@ def _chosen_camera(
     scene: Scene, profile: DisplayProfile, camera: str | None, focus_distance: float | None
 ) -> Camera:
     from lfd_render.display import Camera  # noqa: PLC0415 (keeps --help quick)
+    from lfd_render.renderer import camera_for  # noqa: PLC0415
 
     named = next((c for c in scene.cameras if c.name == camera), None)
     is_file = camera is not None and Path(camera).is_file()
@@ -83,9 +80,7 @@ def _chosen_camera(
         raise SceneError(
             f"--camera: '{camera}'; no such file, and the scene's cameras are: {names}"
         )
-    if scene.default_camera is not None:
-        return Camera.from_json_dict(dict(scene.default_camera))
-    return Camera.frame(*scene.bounds(), profile)
+    return camera_for(scene, profile)
 
 
 def _distance_to_middle(scene: Scene, camera: SceneCamera) -> float:

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from lfd_render.cli import options
-from lfd_render.cli.console import Stopwatch, print_json, progress, say
+from lfd_render.cli.console import Stopwatch, print_json, progress, say, warn
 from lfd_render.cli.inputs import load_display, load_scene, place_camera
 from lfd_render.cli.outputs import check_picture_output, write_picture
 
@@ -40,7 +40,7 @@ def render(
 
     watch = Stopwatch()
     with watch.span("load"), progress("Loading"):
-        profile = load_display(display, spacing)
+        profile = load_display(display)
         loaded = load_scene(scene)
         window = place_camera(
             loaded,
@@ -62,32 +62,22 @@ def render(
             view_size=size,
             technique=technique.value,
             preset=preset.value,
+            spacing=spacing.value if spacing else None,
             seed=seed,
             repeat=repeat,
         )
     with watch.span("encode"), progress("Writing"):
         write_picture(output, eia.save)
 
-    report = dict(eia.report)
-    timings_ms = dict(report.pop("timings_ms"))
-    encode_ms = watch.timings_ms.pop("encode")
-    watch.timings_ms |= timings_ms | {"encode": encode_ms}
-    result = {
-        "output": output,
-        "display": profile.name,
-        "technique": technique.value,
-        "preset": preset.value,
-        "views": views or profile.views,
-        "seed": seed,
-        "repeat": repeat,
-        **report,
-        "camera": window.to_json_dict(),
-        "timings_ms": watch.finish(),
-    }
+    for warning in eia.report["warnings"]:
+        warn(f"{scene}: {warning}")
+    load_ms, encode_ms = watch.timings_ms["load"], watch.timings_ms["encode"]
+    watch.timings_ms = {"load": load_ms, **eia.report["timings_ms"], "encode": encode_ms}
     if json:
-        print_json(result)
+        result = {"output": output, "display": profile.name, "seed": seed, "repeat": repeat}
+        print_json(result | eia.report | {"timings_ms": watch.finish()})
     height, width = eia.pixels.shape[:2]
     say(
-        f"{output}: {width} × {height}, {result['views']} views by {technique.value}, "
-        f"a frame in {timings_ms['frame']:.0f} ms on {report['renderer']}"
+        f"{output}: {width} × {height}, {eia.report['views']} views by {technique.value}, "
+        f"a frame in {watch.timings_ms['frame']:.0f} ms on {eia.report['renderer']}"
     )

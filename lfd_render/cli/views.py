@@ -50,7 +50,7 @@ def views(
 
     watch = Stopwatch()
     with watch.span("load"), progress("Loading"):
-        profile = load_display(display, spacing)
+        profile = load_display(display)
         loaded = load_scene(scene)
         window = place_camera(
             loaded,
@@ -72,6 +72,7 @@ def views(
             view_size=size,
             technique=technique.value,
             preset=preset.value,
+            spacing=spacing.value if spacing else None,
             seed=seed,
         )
     with watch.span("encode"), progress("Writing"):

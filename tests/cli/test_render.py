@@ -1,0 +1,165 @@
+"""`lfd-render render`, with a renderer that renders nothing: options in, picture and JSON out."""
+
+import io
+import json
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lfd_render.display import Camera
+from lfd_render.panel.picture import read_picture
+
+from .conftest import PANEL, Command, FakeRenderer
+
+pytestmark = pytest.mark.usefixtures("renderer")
+
+
+def test_options_reach_the_renderer(
+    command: Command, renderer: FakeRenderer, scene: Path, display: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out.png"
+    result = command(
+        "render", scene, "-o", out, "--display", display, "--views", 5, "--view-size", "30x20",
+        "--technique", "mvr", "--preset", "paper", "--yaw", 90, "--depth-scale", 0.5, "--seed", 9,
+        "--repeat", 3, "--device", "software", "--spacing", "angle",
+    )  # fmt: skip
+    assert result.code == 0
+    assert result.stdout == ""
+    assert read_picture(out).shape == (PANEL[1], PANEL[0], 3)
+    call = renderer.calls[0]
+    camera = call.pop("camera")
+    assert camera.yaw_rad == pytest.approx(math.pi / 2)
+    assert camera.depth_scale == pytest.approx(0.5)
+    assert call.pop("scene").triangle_count == 1
+    assert call.pop("display").name == "small"
+    assert renderer.device == "software"
+    assert call == {
+        "views": 5,
+        "view_size": (30, 20),
+        "technique": "mvr",
+        "preset": "paper",
+        "spacing": "angle",
+        "seed": 9,
+        "repeat": 3,
+    }
+
+
+def test_json_is_one_object_and_messages_go_to_stderr(
+    command: Command, scene: Path, display: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out.png"
+    result = command("render", scene, "-o", out, "-d", display, "--json")
+    assert "something odd" in result.stderr
+    found = result.json
+    assert found["output"] == str(out)
+    assert found["display"] == "small"
+    expected = {
+        "technique",
+        "views",
+        "view_size",
+        "triangles",
+        "points",
+        "renderer",
+        "device_bytes",
+    }
+    assert expected <= set(found)
+    assert list(found["timings_ms"]) == [
+        "load", "compile", "splat", "frame", "read", "encode", "total"
+    ]  # fmt: skip
+    assert found["timings_ms"]["total"] > found["timings_ms"]["load"] > 0
+
+
+def test_camera_of_json_is_a_camera_file(
+    command: Command, renderer: FakeRenderer, scene: Path, display: Path, tmp_path: Path
+) -> None:
+    arguments = ("render", scene, "-o", tmp_path / "a.png", "-d", display, "--json")
+    first = command(*arguments, "--yaw", 20, "--depth-scale", 0.7).json["camera"]
+    file = tmp_path / "camera.json"
+    file.write_text(json.dumps(first), encoding="utf-8")
+    assert command(*arguments, "--camera", file).code == 0
+    asked = [call["camera"].display_from_world(call["display"].size_mm) for call in renderer.calls]
+    np.testing.assert_allclose(asked[0], asked[1], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("extra", "distance"), [((), 5.0), (("--focus-distance", "2"), 2.0)])
+def test_camera_of_the_scene(
+    command: Command,
+    renderer: FakeRenderer,
+    scene: Path,
+    display: Path,
+    tmp_path: Path,
+    extra: tuple[str, ...],
+    distance: float,
+) -> None:
+    out = tmp_path / "a.png"
+    assert command("render", scene, "-o", out, "-d", display, "--camera", "front", *extra).code == 0
+    camera: Camera = renderer.calls[0]["camera"]
+    assert camera.target == pytest.approx((0, 0, 4 - distance))
+    assert camera.eye_direction == pytest.approx((0, 0, 1))
+    assert camera.window_height == pytest.approx(2 * distance * math.tan(math.radians(22.5)))
+
+
+def test_unknown_camera_lists_the_scene_s(
+    command: Command, renderer: FakeRenderer, scene: Path, tmp_path: Path
+) -> None:
+    result = command("render", scene, "-o", tmp_path / "a.png", "--camera", "back")
+    assert result.code == 3
+    assert "'back'" in result.error
+    assert "'front'" in result.error
+    assert renderer.calls == []
+
+
+def test_focus_distance_needs_a_camera_of_the_scene(
+    command: Command, scene: Path, tmp_path: Path
+) -> None:
+    result = command("render", scene, "-o", tmp_path / "a.png", "--focus-distance", 3)
+    assert result.code == 2
+    assert "--camera NAME" in result.error
+
+
+def test_dash_writes_the_picture_to_stdout(
+    command: Command, scene: Path, display: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stdout = io.TextIOWrapper(io.BytesIO())
+    monkeypatch.setattr(sys, "stdout", stdout)
+    assert command("render", scene, "-o", "-", "-d", display).code == 0
+    stdout.seek(0)
+    (tmp_path / "a.png").write_bytes(stdout.buffer.read())
+    assert read_picture(tmp_path / "a.png").shape == (PANEL[1], PANEL[0], 3)
+
+
+@pytest.mark.parametrize(
+    ("output", "code", "words"),
+    [
+        ("missing/out.png", 8, "no such folder"),
+        (".", 8, "is a folder"),
+        ("/proc/out.png", 8, "/proc"),
+        ("out.jpg", 2, ".png"),
+        ("out", 2, ".png"),
+    ],
+)
+def test_bad_output_ends_before_rendering(
+    command: Command,
+    renderer: FakeRenderer,
+    scene: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    output: str,
+    code: int,
+    words: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = command("render", scene, "-o", output)
+    assert result.code == code
+    assert words in result.error
+    assert renderer.calls == []
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_stdout_carries_one_thing(command: Command, scene: Path) -> None:
+    result = command("render", scene, "-o", "-", "--json")
+    assert result.code == 2
+    assert "--json" in result.error
