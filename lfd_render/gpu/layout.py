@@ -34,36 +34,30 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("uint", "unused_0"),
         ("uint", "unused_1"),
     ),
-    # What shading reads at a vertex; positions stand apart because visibility reads only those.
-    "Vertex": (
-        ("vec2", "uv0"),
+    # What few scenes have at a vertex.
+    "VertexExtra": (
         ("vec2", "uv1"),
-        ("uint", "normal_oct"),  # octahedral, 2 × snorm16, local space
         ("uint", "color_rg"),  # 2 × unorm16, linear
         ("uint", "color_ba"),
-        ("uint", "unused_0"),
     ),
-    # A texture of a material: which array, which layer, and its KHR_texture_transform.
-    "TextureSlot": (
-        ("int", "group"),  # index among the arrays of its colour space, −1 when absent
-        ("int", "layer"),
-        ("int", "texcoord"),
-        ("float", "scale"),  # normal scale or occlusion strength
-        ("vec4", "uv_matrix"),  # columns of the 2×2 part
-        ("vec2", "uv_offset"),
-        ("vec2", "texels"),
-    ),
+    # Factors of a material, packed because software devices load word by word, lane by lane.
     "Material": (
-        ("vec4", "base_color"),
-        ("vec4", "emissive"),  # rgb, w unused
-        ("float", "metallic"),
-        ("float", "roughness"),
-        ("float", "alpha_cutoff"),
-        ("uint", "alpha_mode"),  # ALPHA_* below
-        ("uint", "unlit"),
-        ("uint", "unused_0"),
-        ("uint", "unused_1"),
-        ("uint", "unused_2"),
+        ("uint", "base_color_rg"),  # 2 × unorm16, linear
+        ("uint", "base_color_ba"),
+        ("uint", "emissive_rg"),  # 2 × half
+        ("uint", "emissive_b_cutoff"),  # 2 × half: blue, alpha cutoff
+        ("uint", "metallic_roughness"),  # 2 × unorm16
+        ("uint", "normal_occlusion"),  # 2 × half: normal scale, occlusion strength
+        ("uint", "flags"),  # ALPHA_*, and UNLIT
+        # Most texels any texture lays on a unit of texture area, by coordinate set (equation 1).
+        ("float", "texels_uv0"),
+        ("float", "texels_uv1"),
+    ),
+    # KHR_texture_transform of a slot: columns of the 2×2 part, and the offset.
+    "UvTransform": (
+        ("vec4", "matrix"),
+        ("vec2", "offset"),
+        ("vec2", "unused"),
     ),
     # One band of one frame: window, view grid and the extreme eyes. Also valid as std140.
     "Frame": (
@@ -102,6 +96,13 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("uint", "visible"),
         ("uint", "items"),  # rows of visible triangles
     ),
+    # Counts of the list of blocks to shade: the first three words dispatch.
+    "BlockWork": (
+        ("uint", "groups_x"),
+        ("uint", "groups_y"),
+        ("uint", "groups_z"),
+        ("uint", "blocks"),
+    ),
 }
 
 CONSTANTS: dict[str, int] = {
@@ -113,6 +114,12 @@ CONSTANTS: dict[str, int] = {
     "ALPHA_OPAQUE": 0,
     "ALPHA_MASK": 1,
     "ALPHA_BLEND": 2,
+    "ALPHA_BITS": 3,  # mask of the three above
+    "UNLIT": 4,
+    # A texture slot is one word: group, then layer, then coordinate set.
+    "SLOT_GROUP_BITS": 8,
+    "SLOT_LAYER_BITS": 16,
+    "NO_TEXTURE": 0xFFFFFFFF,
 }
 
 

@@ -134,6 +134,11 @@ class TextureArray:
         raw.glTextureParameteri(self.name, gl.TEXTURE_WRAP_S, gl.WRAPS[wrap[0]])
         raw.glTextureParameteri(self.name, gl.TEXTURE_WRAP_T, gl.WRAPS[wrap[1]])
 
+    def clear(self, color: tuple[float, float, float, float]) -> None:
+        """Set every texel of level 0."""
+        value = (ctypes.c_float * 4)(*color)
+        self._device.raw.glClearTexImage(self.name, 0, gl.RGBA, gl.FLOAT, value)
+
     def bind(self, unit: int) -> None:
         """Make the texture what samplers of this unit read."""
         self._device.raw.glBindTextureUnit(unit, self.name)

@@ -29,6 +29,7 @@ COLOR = 0x1800
 DEPTH = 0x1801
 RGB = 0x1907
 HALF_FLOAT = 0x140B
+FLOAT = 0x1406
 PACK_ALIGNMENT = 0x0D05
 DEPTH_TEST = 0x0B71
 CULL_FACE = 0x0B44
@@ -62,6 +63,7 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "glTextureSubImage3D": (None, (_u, _i, _i, _i, _i, _i, _i, _i, _u, _u, _p)),
     "glTextureParameteri": (None, (_u, _u, _i)),
     "glGenerateTextureMipmap": (None, (_u,)),
+    "glClearTexImage": (None, (_u, _i, _u, _u, _p)),
     "glBindTextureUnit": (None, (_u, _u)),
     "glBindImageTexture": (None, (_u, _u, _i, ctypes.c_ubyte, _i, _u, _u)),
     "glGetTextureImage": (None, (_u, _i, _u, _u, _i, _p)),

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lfd_render.gpu.layout import CONSTANTS, dtype
-from lfd_render.gpu.memory import Buffer
+from lfd_render.gpu.layout import CONSTANTS, TEXTURE_ROLES, dtype
+from lfd_render.gpu.memory import Buffer, TextureArray
 from lfd_render.gpu.textures import MaterialTextures
 from lfd_render.scene import Material, Mesh, Scene
 
@@ -38,12 +38,24 @@ class DrawRun:
 
 
 @dataclass
+class _Attributes:
+    """What shading reads, in device form: normals [n] octahedral, uv0 [n, 2], extras [n]."""
+
+    normals: NDArray[np.uint32]
+    uv0: NDArray[np.float32]
+    extras: NDArray[np.void]
+
+    def __getitem__(self, used: NDArray[np.intp]) -> _Attributes:
+        return _Attributes(self.normals[used], self.uv0[used], self.extras[used])
+
+
+@dataclass
 class _Part:
     """Triangles of one draw, with exactly the vertices they use."""
 
     draw: int
     positions: NDArray[np.float32]
-    vertices: NDArray[np.void]
+    attributes: _Attributes
     triangles: NDArray[np.uint32]
 
 
@@ -72,10 +84,15 @@ class Batch:
             corners[row:end, :3] = part.triangles + np.uint32(start)
             corners[row:end, 3] = part.draw
             row = end
+        attributes = [part.attributes for part in parts]
         self.local_positions = Buffer.of(device, "positions", positions)
         self.display_positions = Buffer(device, "display positions", positions.nbytes)
-        self.vertex_data = Buffer.of(
-            device, "vertices", np.concatenate([part.vertices for part in parts])
+        normals = np.concatenate([a.normals for a in attributes])
+        self.local_normals = Buffer.of(device, "normals", normals)
+        self.world_normals = Buffer(device, "normals", normals.nbytes)
+        self.uv0 = Buffer.of(device, "texture coordinates", np.concatenate([a.uv0 for a in attributes]))
+        self.extras = Buffer.of(
+            device, "vertex extras", np.concatenate([a.extras for a in attributes])
         )
         self.corners = Buffer.of(device, "triangles", corners)
 
@@ -83,10 +100,19 @@ class Batch:
         """What visibility reads, by block name (draws are the scene's)."""
         return {"Triangles": self.corners, "DisplayPositions": self.display_positions}
 
+    def attributes(self) -> dict[str, Buffer]:
+        """What shading reads at vertices, by block name."""
+        return {
+            "TexCoords": self.uv0,
+            "WorldNormals": self.world_normals,
+            "VertexExtras": self.extras,
+        }
+
     def release(self) -> None:
         """Free the batch."""
         for buffer in (
-            self.local_positions, self.display_positions, self.vertex_data, self.corners,
+            self.local_positions, self.display_positions, self.local_normals, self.world_normals,
+            self.uv0, self.extras, self.corners,
         ):  # fmt: skip
             buffer.release()
 
@@ -107,12 +133,14 @@ class SceneBuffers:
             self._records[f"normal_matrix_{field}"][:, :3] = (normal / scale)[:, :, axis]
         self._records["material"] = [scene.meshes[i.mesh].material for i in scene.instances]
         self.draws = Buffer(device, "draws", self._records.nbytes)
-        self.materials = Buffer.of(device, "materials", _material_records(scene.materials))
+        self.materials = Buffer.of(device, "materials", _material_records(scene))
         self.slots = Buffer.of(device, "materials", self.textures.slots)
+        self.uv_transforms = Buffer.of(device, "materials", self.textures.uv_transforms)
+        self._extras = any(_needs_extras(mesh) for mesh in scene.meshes)
         self.batches: list[Batch] = []
         base = 0
         for alpha_tested in (False, True):
-            for parts in _batches(scene, alpha_tested=alpha_tested):
+            for parts in _batches(scene, alpha_tested=alpha_tested, extras=self._extras):
                 batch = Batch(device, parts, base, alpha_tested=alpha_tested)
                 self.batches.append(batch)
                 base += batch.triangles
@@ -149,14 +177,32 @@ class SceneBuffers:
         return runs
 
     def materials_of(self) -> dict[str, Buffer]:
-        """What shading reads besides geometry, by block name."""
-        return {"Materials": self.materials, "TextureSlots": self.slots}
+        """Materials, by block name."""
+        return {
+            "Materials": self.materials,
+            "TextureSlots": self.slots,
+            "UvTransforms": self.uv_transforms,
+        }
+
+    def samplers(self) -> dict[str, list[TextureArray]]:
+        """Texture arrays, by sampler name."""
+        return {"srgb_maps": self.textures.srgb, "linear_maps": self.textures.linear}
 
     def constants(self) -> dict[str, int]:
-        """Macros that shaders reading textures need."""
+        """Macros of the shaders that read vertices or materials: what this scene has."""
+        materials = self.scene.materials
+        roles = 0
+        for bit, role in enumerate(TEXTURE_ROLES):
+            if any(getattr(m, f"{role}_texture") is not None for m in materials):
+                roles |= 1 << bit
+        slots = [slot for m in materials for slot in m.texture_slots().values()]
         return {
             "SRGB_GROUPS": len(self.textures.srgb),
             "LINEAR_GROUPS": len(self.textures.linear),
+            "ROLES": roles,
+            "VERTEX_EXTRAS": int(self._extras),
+            "UV_TRANSFORMS": int(any(slot.uv_transform is not None for slot in slots)),
+            "SHARED_OCCLUSION": int(all(_shares_occlusion(m) for m in materials)),
         }
 
     def _material(self, draw: int) -> Material:
@@ -166,7 +212,7 @@ class SceneBuffers:
         """Free everything."""
         for batch in self.batches:
             batch.release()
-        for buffer in (self.draws, self.materials, self.slots):
+        for buffer in (self.draws, self.materials, self.slots, self.uv_transforms):
             buffer.release()
         self.textures.release()
 
@@ -177,17 +223,34 @@ def _nonsingular(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(singular[:, None, None], np.eye(3), matrices)
 
 
-def _batches(scene: Scene, *, alpha_tested: bool) -> Iterator[list[_Part]]:
+def _needs_extras(mesh: Mesh) -> bool:
+    return bool(np.any(mesh.colors != 1.0) or np.any(mesh.texcoords[:, 1]))
+
+
+def _shares_occlusion(material: Material) -> bool:
+    """Whether occlusion, if any, is the red channel of the metallic-roughness texture."""
+    occlusion, packed = material.occlusion_texture, material.metallic_roughness_texture
+    if occlusion is None:
+        return True
+    return packed is not None and (
+        (occlusion.image, occlusion.texcoord, occlusion.wrap)
+        == (packed.image, packed.texcoord, packed.wrap)
+        and occlusion.uv_transform is None
+        and packed.uv_transform is None
+    )
+
+
+def _batches(scene: Scene, *, alpha_tested: bool, extras: bool) -> Iterator[list[_Part]]:
     """Parts of all draws of one kind, in lists that fit a batch."""
     parts: list[_Part] = []
     triangles = vertices = 0
-    attributes: dict[int, NDArray[np.void]] = {}
+    attributes: dict[int, _Attributes] = {}
     for draw, instance in enumerate(scene.instances):
         mesh = scene.meshes[instance.mesh]
         if (scene.materials[mesh.material].alpha_mode != "opaque") != alpha_tested:
             continue
         if instance.mesh not in attributes:
-            attributes[instance.mesh] = _vertex_records(mesh)
+            attributes[instance.mesh] = _attributes(mesh, extras=extras)
         for part in _split(draw, mesh, attributes[instance.mesh]):
             full = triangles + len(part.triangles) > BATCH_TRIANGLES
             if parts and (full or vertices + len(part.positions) > BATCH_VERTICES):
@@ -200,7 +263,7 @@ def _batches(scene: Scene, *, alpha_tested: bool) -> Iterator[list[_Part]]:
         yield parts
 
 
-def _split(draw: int, mesh: Mesh, vertices: NDArray[np.void]) -> Iterator[_Part]:
+def _split(draw: int, mesh: Mesh, vertices: _Attributes) -> Iterator[_Part]:
     """One mesh in parts that fit a batch; nearly always it fits whole."""
     if len(mesh.triangles) <= BATCH_TRIANGLES and len(mesh.positions) <= BATCH_VERTICES:
         yield _Part(draw, mesh.positions, vertices, mesh.triangles)
@@ -212,15 +275,14 @@ def _split(draw: int, mesh: Mesh, vertices: NDArray[np.void]) -> Iterator[_Part]
         yield _Part(draw, mesh.positions[used], vertices[used], corners)
 
 
-def _vertex_records(mesh: Mesh) -> NDArray[np.void]:
-    records = np.zeros(len(mesh.positions), dtype("Vertex"))
-    records["uv0"] = mesh.texcoords[:, 0]
-    records["uv1"] = mesh.texcoords[:, 1]
-    records["normal_oct"] = _octahedral(mesh.normals)
-    color = np.rint(np.clip(mesh.colors, 0.0, 1.0) * 65535.0).astype(np.uint32)
-    records["color_rg"] = color[:, 0] | color[:, 1] << 16
-    records["color_ba"] = color[:, 2] | color[:, 3] << 16
-    return records
+def _attributes(mesh: Mesh, *, extras: bool) -> _Attributes:
+    records = np.zeros(len(mesh.positions) if extras else 1, dtype("VertexExtra"))
+    if extras:
+        records["uv1"] = mesh.texcoords[:, 1]
+        color = np.rint(np.clip(mesh.colors, 0.0, 1.0) * 65535.0).astype(np.uint32)
+        records["color_rg"] = color[:, 0] | color[:, 1] << 16
+        records["color_ba"] = color[:, 2] | color[:, 3] << 16
+    return _Attributes(_octahedral(mesh.normals), mesh.texcoords[:, 0], records)
 
 
 def _octahedral(normals: NDArray[np.float32]) -> NDArray[np.uint32]:
@@ -233,14 +295,35 @@ def _octahedral(normals: NDArray[np.float32]) -> NDArray[np.uint32]:
     return words[:, 0] | words[:, 1] << 16
 
 
-def _material_records(materials: tuple[Material, ...]) -> NDArray[np.void]:
-    records = np.zeros(len(materials), dtype("Material"))
-    for record, material in zip(records, materials, strict=True):
-        record["base_color"] = material.base_color
-        record["emissive"][:3] = material.emissive
-        record["metallic"] = material.metallic
-        record["roughness"] = material.roughness
-        record["alpha_cutoff"] = material.alpha_cutoff
-        record["alpha_mode"] = CONSTANTS[f"ALPHA_{material.alpha_mode.upper()}"]
-        record["unlit"] = material.unlit
+def _material_records(scene: Scene) -> NDArray[np.void]:
+    records = np.zeros(len(scene.materials), dtype("Material"))
+    for record, material in zip(records, scene.materials, strict=True):
+        red, green, blue, alpha = material.base_color
+        record["base_color_rg"] = _unorm16x2(red, green)
+        record["base_color_ba"] = _unorm16x2(blue, alpha)
+        record["emissive_rg"] = _half2(*material.emissive[:2])
+        record["emissive_b_cutoff"] = _half2(material.emissive[2], material.alpha_cutoff)
+        record["metallic_roughness"] = _unorm16x2(material.metallic, material.roughness)
+        normal, occlusion = material.normal_texture, material.occlusion_texture
+        record["normal_occlusion"] = _half2(
+            normal.scale if normal else 1.0, occlusion.scale if occlusion else 1.0
+        )
+        alpha_mode = CONSTANTS[f"ALPHA_{material.alpha_mode.upper()}"]
+        record["flags"] = alpha_mode | (CONSTANTS["UNLIT"] if material.unlit else 0)
+        for slot in material.texture_slots().values():
+            height, width = scene.images[slot.image].pixels.shape[:2]
+            stretch = 1.0 if slot.uv_transform is None else np.linalg.det(slot.uv_transform[:2, :2])
+            field = f"texels_uv{slot.texcoord}"
+            record[field] = max(record[field], abs(stretch) * width * height)
     return records
+
+
+def _unorm16x2(low: float, high: float) -> int:
+    words = np.rint(np.clip([low, high], 0.0, 1.0) * 65535.0).astype(np.uint32)
+    return int(words[0] | words[1] << 16)
+
+
+def _half2(low: float, high: float) -> int:
+    largest = float(np.finfo(np.float16).max)
+    words = np.clip([low, high], -largest, largest).astype(np.float16).view(np.uint16)
+    return int(words[0]) | int(words[1]) << 16

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image as PilImage
 
 from lfd_render.gpu import raw as gl
-from lfd_render.gpu.layout import TEXTURE_ROLES, dtype
+from lfd_render.gpu.layout import CONSTANTS, TEXTURE_ROLES, dtype
 from lfd_render.gpu.memory import TextureArray
 from lfd_render.scene import Image, Material, TextureSlot
 
@@ -29,7 +29,7 @@ _Key = tuple[bool, int, int, str, str]  # sRGB, width, height, wrap s, wrap t
 class MaterialTextures:
     """The arrays of both colour spaces, and the slot table that points into them.
 
-    slots: TextureSlot records [material × role]. srgb, linear: never empty, since GLSL has no
+    slots: a word each [material × role]; uv_transforms: UvTransform [material × role]. srgb, linear: never empty, since GLSL has no
     arrays of no samplers; a single white texel stands in.
     """
 
@@ -48,8 +48,10 @@ class MaterialTextures:
             if (slot := getattr(material, f"{role}_texture")) is not None
         ]
         keys = self._fit_units([self._key(srgb, slot) for _, srgb, slot in uses])
-        self.slots = np.zeros(len(materials) * len(TEXTURE_ROLES), dtype("TextureSlot"))
-        self.slots["group"] = -1
+        count = len(materials) * len(TEXTURE_ROLES)
+        self.slots = np.full(count, CONSTANTS["NO_TEXTURE"], np.uint32)
+        self.uv_transforms = np.zeros(count, dtype("UvTransform"))
+        self.uv_transforms["matrix"] = (1.0, 0.0, 0.0, 1.0)
         for (index, _, slot), key in zip(uses, keys, strict=True):
             self._place(index, slot, key)
         self.srgb = self._upload(srgb=True)
@@ -93,13 +95,12 @@ class MaterialTextures:
             groups = [k for k in self._layers if k[0] == key[0]]
             self._placed[slot.image, key] = (groups.index(key), len(layers))
             layers.append(slot.image)
-        record = self.slots[index]
-        record["group"], record["layer"] = self._placed[slot.image, key]
-        record["texcoord"], record["scale"] = slot.texcoord, slot.scale
-        matrix = np.eye(3) if slot.uv_transform is None else slot.uv_transform
-        record["uv_matrix"] = matrix[:2, :2].T.reshape(4)
-        record["uv_offset"] = matrix[:2, 2]
-        record["texels"] = key[1:3]
+        group, layer = self._placed[slot.image, key]
+        group_bits, layer_bits = CONSTANTS["SLOT_GROUP_BITS"], CONSTANTS["SLOT_LAYER_BITS"]
+        self.slots[index] = group | layer << group_bits | slot.texcoord << (group_bits + layer_bits)
+        if slot.uv_transform is not None:
+            self.uv_transforms[index]["matrix"] = slot.uv_transform[:2, :2].T.reshape(4)
+            self.uv_transforms[index]["offset"] = slot.uv_transform[:2, 2]
 
     def _upload(self, *, srgb: bool) -> list[TextureArray]:
         groups = {key: layers for key, layers in self._layers.items() if key[0] == srgb}

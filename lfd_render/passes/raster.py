@@ -93,16 +93,15 @@ class RasterForward:
             "DisplayPositions": batch.display_positions,
             "LocalPositions": batch.local_positions,
             "Draws": self._scene.draws,
-            "Vertices": batch.vertex_data,
+            **batch.attributes(),
             "FrameBlock": self._target.frame(band, batch),
             **self._scene.materials_of(),
         }
-        textures = self._scene.textures
-        samplers = {"srgb_maps": textures.srgb, "linear_maps": textures.linear}
+        samplers = self._scene.samplers()
         per_view = {"view": view} if batch.alpha_tested else {}
         for run in self._scene.runs(batch):
             self._programs[batch.alpha_tested].set(
-                buffers, {**camera, **per_view, "facing_sign": -1 if run.mirrored else 1}, samplers
+                buffers, {**camera, **per_view}, samplers
             )
             (raw.glDisable if run.double_sided else raw.glEnable)(gl.CULL_FACE)
             # Row 0 at the raster's bottom turns windings over.

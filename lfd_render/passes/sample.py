@@ -51,7 +51,12 @@ class Sample:
     """
 
     def __init__(
-        self, device: Device, view_lanes: int, *, stochastic_culling: bool = False
+        self,
+        device: Device,
+        scene: SceneBuffers,
+        view_lanes: int,
+        *,
+        stochastic_culling: bool = False,
     ) -> None:
         self._device = device
         self._view_lanes = view_lanes
@@ -61,7 +66,9 @@ class Sample:
             "GROUPS_ACROSS": GROUPS_ACROSS,
         }
         self._span = Kernel(
-            device, "sample/span.comp", {"STOCHASTIC_CULLING": int(stochastic_culling)}
+            device,
+            "sample/span.comp",
+            {"STOCHASTIC_CULLING": int(stochastic_culling), **scene.constants()},
         )
         self._sum = Kernel(device, "sample/sum.comp", constants)
         self._scan = Kernel(device, "sample/scan.comp", constants)
@@ -89,8 +96,8 @@ class Sample:
                 **batch.geometry(),
                 **frame,
                 "Draws": scene.draws,
-                "Vertices": batch.vertex_data,
-                "TextureSlots": scene.slots,
+                **batch.attributes(),
+                **scene.materials_of(),
                 "Spans": points.spans,
             }
         )
@@ -130,7 +137,6 @@ class Sample:
                 **points.blocks(),
                 "Draws": scene.draws,
                 "FrameBlock": target.frame(band, batch),
-                "Eyes": target.eyes,
                 "RowOffsets": target.row_offsets,
                 "PointCount": self._total,
             }

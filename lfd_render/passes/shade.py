@@ -6,21 +6,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.gpu.device import Device
+from lfd_render.gpu.layout import dtype
+from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import SceneBuffers
+from lfd_render.passes.sample import GROUPS_ACROSS
 from lfd_render.passes.splat import ViewBuffers
 from lfd_render.passes.view_target import Band, ViewTarget
 
-_GROUP = 64  # local_size_x of shade/ray.comp
+BLOCK = 16  # columns of a view shaded together
+GROUP_BLOCKS = 4  # blocks of a work group
+_LIST_GROUP = 64  # local_size_x of shade/blocks.comp
 
 
 class Shade:
     """ViewBuffers, ViewTarget → ViewTarget.images: each visible pixel is shaded once, where its ray
-    meets the triangle that its word names."""
+    meets the triangle that its word names. Pixels of no triangle get the background."""
 
-    def __init__(self, device: Device, scene: SceneBuffers) -> None:
+    def __init__(self, device: Device, scene: SceneBuffers, target: ViewTarget) -> None:
+        constants = {
+            "BLOCK": BLOCK,
+            "GROUP_BLOCKS": GROUP_BLOCKS,
+            "GROUPS_ACROSS": GROUPS_ACROSS,
+            **scene.constants(),
+        }
         self._scene = scene
-        self._kernel = Kernel(device, "shade/ray.comp", scene.constants())
+        self._list = Kernel(device, "shade/blocks.comp", constants)
+        self._shade = Kernel(device, "shade/ray.comp", constants)
+        self._row_blocks = -(-target.grid.columns // BLOCK)
+        lines = max(band.rows for band in target.bands) * target.rig.views
+        self._blocks = Buffer(device, "shading blocks", 4 * self._row_blocks * lines)
+        self._work = Buffer(device, "shading blocks", dtype("BlockWork").itemsize)
+        self._no_work = np.zeros(1, dtype("BlockWork"))
+        self._no_work["groups_z"] = 1
 
     def __call__(
         self,
@@ -31,28 +49,50 @@ class Shade:
         background: tuple[float, float, float],
     ) -> None:
         """Shade a band. world_from_display: float64 [4, 4]; background: linear RGB."""
+        target.images.clear((*background, 0.0))
         target.images.bind_image(0)
+        block_count = self._row_blocks * target.rig.views * band.rows
+        groups = -(-block_count // _LIST_GROUP)
+        across = min(groups, GROUPS_ACROSS)
         for batch in self._scene.batches:
-            self._kernel.set(
+            shared = {
+                "FrameBlock": target.frame(band, batch),
+                "Words": views.words,
+                "Blocks": self._blocks,
+                "BlockWorkBlock": self._work,
+            }
+            self._work.write(self._no_work)
+            self._list.set(
+                shared,
                 {
+                    "block_count": block_count,
+                    "row_blocks": self._row_blocks,
+                    "groups_across": across,
+                },
+            )
+            self._list.run((across, -(-groups // across), 1))
+            self._shade.set(
+                {
+                    **shared,
                     **batch.geometry(),
+                    **batch.attributes(),
                     **self._scene.materials_of(),
                     "Draws": self._scene.draws,
-                    "Vertices": batch.vertex_data,
-                    "FrameBlock": target.frame(band, batch),
-                    "Words": views.words,
                     "Eyes": target.eyes,
                     "RowOffsets": target.row_offsets,
                 },
-                {"world_from_display": gl_matrix(world_from_display), "background": background},
-                {"srgb_maps": self._scene.textures.srgb, "linear_maps": self._scene.textures.linear},
+                {
+                    "world_from_display": gl_matrix(world_from_display),
+                    "row_blocks": self._row_blocks,
+                },
+                self._scene.samplers(),
             )
-            columns = -(-target.grid.columns // _GROUP)
-            self._kernel.run((columns, band.rows, target.rig.views))
+            self._shade.run_indirect(self._work)
 
     def release(self) -> None:
-        """Free the kernel."""
-        self._kernel.release()
+        """Free kernels and the list."""
+        for owner in (self._list, self._shade, self._blocks, self._work):
+            owner.release()
 
 
 def gl_matrix(matrix: NDArray[np.float64]) -> bytes:

@@ -91,17 +91,14 @@ class Splat:
                 **points.blocks(),
                 **self._scene.materials_of(),
                 "Draws": self._scene.draws,
-                "Vertices": batch.vertex_data,
+                **batch.attributes(),
                 "FrameBlock": target.frame(band, batch),
                 "Eyes": target.eyes,
                 "RowOffsets": target.row_offsets,
                 "Depths": views.depths,
                 "Words": views.words,
             },
-            samplers={
-                "srgb_maps": self._scene.textures.srgb,
-                "linear_maps": self._scene.textures.linear,
-            },
+            samplers=self._scene.samplers(),
         )
         kernel.run_indirect(points.work)
 

@@ -19,7 +19,9 @@ class Transform:
             {
                 "LocalPositions": batch.local_positions,
                 "Draws": scene.draws,
+                "LocalNormals": batch.local_normals,
                 "DisplayPositions": batch.display_positions,
+                "WorldNormals": batch.world_normals,
             },
             {"vertices": batch.vertices},
         )

@@ -28,9 +28,9 @@ class Lfdpr:
         self.target = target
         self._scene = scene
         self._transform = Transform(device)
-        self._sample = Sample(device, lanes, stochastic_culling=stochastic_culling)
+        self._sample = Sample(device, scene, lanes, stochastic_culling=stochastic_culling)
         self._splat = Splat(device, scene, lanes)
-        self._shade = Shade(device, scene)
+        self._shade = Shade(device, scene, target)
         self._points = [self._sample.allocate(batch) for batch in scene.batches]
         self._views = ViewBuffers(device, target)
 

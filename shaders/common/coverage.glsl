@@ -10,8 +10,9 @@ float blend_threshold(ivec3 pixel, uint material) {
     return fract(start + float(pixel.z) * 0.61803399);  // golden ratio: low discrepancy over views
 }
 
-bool alpha_accepts_value(float alpha, Material material, uint material_index, ivec3 pixel) {
-    if (material.alpha_mode == ALPHA_MASK) return alpha >= material.alpha_cutoff;
-    if (material.alpha_mode == ALPHA_BLEND) return alpha > blend_threshold(pixel, material_index);
+bool alpha_accepts_value(float alpha, uint material, ivec3 pixel) {
+    uint mode = materials[material].flags & ALPHA_BITS;
+    if (mode == ALPHA_MASK) return alpha >= unpackHalf2x16(materials[material].emissive_b_cutoff).y;
+    if (mode == ALPHA_BLEND) return alpha > blend_threshold(pixel, material);
     return true;
 }

@@ -5,7 +5,7 @@
 
 struct Plane {
     vec3 normal;      // (B − A) × (C − A), mm²
-    vec3 a;           // a vertex
+    float at_centre;  // normal·(eye − A) for the eye at s = 0
     vec2 depths;      // nearest and farthest depth of the triangle's part in front of the near plane
 };
 
@@ -13,16 +13,16 @@ Plane triangle_plane(vec3 a, vec3 b, vec3 c) {
     precise vec3 ab = b - a, ac = c - a;
     precise vec3 normal = vec3(ab.y * ac.z - ab.z * ac.y, ab.z * ac.x - ab.x * ac.z,
                                ab.x * ac.y - ab.y * ac.x);
+    precise float at_centre = normal.z * (frame.distance_mm - a.z) - normal.x * a.x - normal.y * a.y;
     vec3 depths = vec3(frame.distance_mm) - vec3(a.z, b.z, c.z);
     float nearest = max(frame.near_mm, min(depths.x, min(depths.y, depths.z)));
     float farthest = max(depths.x, max(depths.y, depths.z));
-    return Plane(normal, a, vec2(nearest, farthest));
+    return Plane(normal, at_centre, vec2(nearest, farthest));
 }
 
 // normal·(eye − A): its sign is the side the eye stands on, its magnitude the sampling density.
 float eye_side(Plane plane, float eye_mm) {
-    precise float side = plane.normal.x * (eye_mm - plane.a.x) - plane.normal.y * plane.a.y
-        + plane.normal.z * (frame.distance_mm - plane.a.z);
+    precise float side = plane.at_centre + plane.normal.x * eye_mm;
     return side;
 }
 
@@ -36,9 +36,9 @@ float densest_eye_columns(Plane plane) {
 
 // Depth d = D − Z where the ray from the eye through a window point meets the plane, kept within
 // the triangle's own depths, which bounds what rounding does to slivers.
-float plane_depth(Plane plane, float side, float eye_mm, float x_mm, float y_mm) {
+float plane_depth(Plane plane, float eye_mm, float x_mm, float y_mm) {
     precise float toward = plane.normal.x * (eye_mm - x_mm) - plane.normal.y * y_mm
         + plane.normal.z * frame.distance_mm;
-    precise float depth = frame.distance_mm * side / toward;
+    precise float depth = frame.distance_mm * eye_side(plane, eye_mm) / toward;
     return clamp(toward == 0.0 ? plane.depths.x : depth, plane.depths.x, plane.depths.y);
 }

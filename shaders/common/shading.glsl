@@ -21,20 +21,18 @@ struct Surface {
 
 // Tangent frame from the gradients of position and texture coordinate, so that files without tangents
 // and files with them shade alike. +Y of the map is up in the picture, against v.
-vec3 mapped_normal(vec3 normal, Surface surface, TextureSlot slot) {
-    Footprint f = slot_footprint(slot, surface.uv0, surface.uv1);
+vec3 mapped_normal(vec3 normal, Surface surface, uint slot) {
+    Footprint f = slot_footprint(surface.material, NORMAL, surface.uv0, surface.uv1);
     float determinant = f.dx.x * f.dy.y - f.dx.y * f.dy.x;
-    if (determinant == 0.0) return normal;
     vec3 along_u = (surface.dp_dx * f.dy.y - surface.dp_dy * f.dx.y) * sign(determinant);
     vec3 along_v = (surface.dp_dy * f.dx.x - surface.dp_dx * f.dy.x) * sign(determinant);
     vec3 tangent = along_u - normal * dot(normal, along_u);
-    vec3 bitangent = -(along_v - normal * dot(normal, along_v));
+    vec3 bitangent = normal * dot(normal, along_v) - along_v;
     float length_t = dot(tangent, tangent), length_b = dot(bitangent, bitangent);
     if (length_t == 0.0 || length_b == 0.0) return normal;
     vec3 m = sample_linear(slot, f).xyz * 2.0 - 1.0;
-    m.xy *= slot.scale;
-    vec3 mapped = m.x * tangent * inversesqrt(length_t) + m.y * bitangent * inversesqrt(length_b) + m.z * normal;
-    return normalize(mapped);
+    m.xy *= unpackHalf2x16(materials[surface.material].normal_occlusion).x;
+    return normalize(m.x * tangent * inversesqrt(length_t) + m.y * bitangent * inversesqrt(length_b) + m.z * normal);
 }
 
 // Environment BRDF: scale and bias of the specular colour, a polynomial fit by Karis (2014, "Physically
@@ -56,39 +54,59 @@ vec3 specular_brdf(vec3 f0, float alpha, float n_dot_l, float n_dot_v, float n_d
     return fresnel * distribution * masking;
 }
 
-vec3 shade(Surface surface, vec3 eye_world) {
-    Material material = materials[surface.material];
-    vec4 base_color = material.base_color * surface.color;
-    TextureSlot slot = slot_of(surface.material, BASE_COLOR);
-    if (slot.group >= 0) base_color *= sample_srgb(slot, slot_footprint(slot, surface.uv0, surface.uv1));
-    if (material.unlit != 0u) return base_color.rgb;
+// Base colour with its texture and the vertices' colours, linear, alpha included.
+vec4 base_color_of(Surface surface) {
+    vec4 color = material_base_color(surface.material) * surface.color;
+    uint slot = slot_of(surface.material, BASE_COLOR);
+    if (slot != NO_TEXTURE)
+        color *= sample_srgb(slot, slot_footprint(surface.material, BASE_COLOR, surface.uv0, surface.uv1));
+    return color;
+}
 
-    float metallic = material.metallic, roughness = material.roughness, occlusion = 1.0;
-    slot = slot_of(surface.material, METALLIC_ROUGHNESS);
-    vec4 packed_maps = vec4(1.0);
-    if (slot.group >= 0) packed_maps = sample_linear(slot, slot_footprint(slot, surface.uv0, surface.uv1));
-    roughness *= packed_maps.g;
-    metallic *= packed_maps.b;
-    TextureSlot occlusion_slot = slot_of(surface.material, OCCLUSION);
-    if (occlusion_slot.group >= 0) {
-        bool same = occlusion_slot.group == slot.group && occlusion_slot.layer == slot.layer;
-        if (!same) packed_maps = sample_linear(occlusion_slot, slot_footprint(occlusion_slot, surface.uv0, surface.uv1));
-        occlusion = 1.0 + occlusion_slot.scale * (packed_maps.r - 1.0);
-    }
+// Occlusion, roughness, metallic, as the maps' channels lie (r, g, b).
+vec3 occlusion_roughness_metallic(Surface surface) {
+    vec2 factors = unpackUnorm2x16(materials[surface.material].metallic_roughness);
+    uint slot = slot_of(surface.material, METALLIC_ROUGHNESS), occlusion_slot = slot_of(surface.material, OCCLUSION);
+    vec4 maps = vec4(1.0);
+    if (slot != NO_TEXTURE)
+        maps = sample_linear(slot, slot_footprint(surface.material, METALLIC_ROUGHNESS, surface.uv0, surface.uv1));
+    float occlusion = maps.r;
+    // Files nearly always pack both in one texture, which SHARED_OCCLUSION says of the whole scene.
+    if (SHARED_OCCLUSION == 0 && occlusion_slot != NO_TEXTURE)
+        occlusion = sample_linear(occlusion_slot, slot_footprint(surface.material, OCCLUSION, surface.uv0, surface.uv1)).r;
+    float strength = unpackHalf2x16(materials[surface.material].normal_occlusion).y;
+    occlusion = occlusion_slot == NO_TEXTURE ? 1.0 : 1.0 + strength * (occlusion - 1.0);
+    return vec3(occlusion, maps.g * factors.y, maps.b * factors.x);
+}
+
+vec3 emitted(Surface surface) {
+    Material material = materials[surface.material];
+    vec3 radiance = vec3(unpackHalf2x16(material.emissive_rg), unpackHalf2x16(material.emissive_b_cutoff).x);
+    uint slot = slot_of(surface.material, EMISSIVE);
+    if (slot != NO_TEXTURE)
+        radiance *= sample_srgb(slot, slot_footprint(surface.material, EMISSIVE, surface.uv0, surface.uv1)).rgb;
+    return radiance;
+}
+
+vec3 shade(Surface surface, vec3 eye_world) {
+    vec3 base_color = base_color_of(surface).rgb;
+    if ((materials[surface.material].flags & UNLIT) != 0u) return base_color;
+    vec3 orm = occlusion_roughness_metallic(surface);
+    float roughness = orm.g, metallic = orm.b;
 
     vec3 normal = surface.normal * inversesqrt(max(1e-20, dot(surface.normal, surface.normal)));
-    slot = slot_of(surface.material, NORMAL);
-    if (slot.group >= 0) normal = mapped_normal(normal, surface, slot);
+    uint slot = slot_of(surface.material, NORMAL);
+    if (slot != NO_TEXTURE) normal = mapped_normal(normal, surface, slot);
     if (surface.back) normal = -normal;
 
     vec3 view = normalize(eye_world - surface.p_world);
     float n_dot_v = clamp(abs(dot(normal, view)), 1e-4, 1.0);
-    vec3 f0 = mix(vec3(0.04), base_color.rgb, metallic);
-    vec3 albedo = base_color.rgb * (1.0 - metallic);
+    vec3 f0 = mix(vec3(0.04), base_color, metallic);
+    vec3 albedo = base_color * (1.0 - metallic);
     float alpha = max(SMALLEST_ALPHA, roughness * roughness);
 
     vec2 brdf = environment_brdf(roughness, n_dot_v);
-    vec3 radiance = occlusion * (albedo * environment_diffuse(normal)
+    vec3 radiance = orm.r * (albedo * environment_diffuse(normal)
         + (f0 * brdf.x + brdf.y) * environment_radiance(reflect(-view, normal), roughness));
 
     float n_dot_l = dot(normal, KEY_DIRECTION);
@@ -97,9 +115,5 @@ vec3 shade(Surface surface, vec3 eye_world) {
         vec3 specular = specular_brdf(f0, alpha, n_dot_l, n_dot_v, clamp(dot(normal, halfway), 0.0, 1.0), clamp(dot(view, halfway), 0.0, 1.0));
         radiance += KEY_IRRADIANCE * n_dot_l * (albedo / PI + specular);
     }
-
-    slot = slot_of(surface.material, EMISSIVE);
-    vec3 emissive = material.emissive.rgb;
-    if (slot.group >= 0) emissive *= sample_srgb(slot, slot_footprint(slot, surface.uv0, surface.uv1)).rgb;
-    return radiance + emissive;
+    return radiance + emitted(surface);
 }

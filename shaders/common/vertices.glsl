@@ -1,17 +1,18 @@
-// Vertex attributes that shading reads.
+// Vertex attributes that shading reads. Few scenes have a second coordinate set or colours; without
+// them VERTEX_EXTRAS is 0 and nothing is loaded.
 
-#include "layout/Vertex"
+#include "layout/VertexExtra"
+#include "common/octahedral.glsl"
 
-layout(std430) readonly restrict buffer Vertices { Vertex vertices[]; };
+layout(std430) readonly restrict buffer TexCoords { vec2 tex_coords[]; };
+layout(std430) readonly restrict buffer WorldNormals { uint world_normals[]; };
+layout(std430) readonly restrict buffer VertexExtras { VertexExtra vertex_extras[]; };
 
-vec4 vertex_color(Vertex v) {
-    return vec4(unpackUnorm2x16(v.color_rg), unpackUnorm2x16(v.color_ba));
+vec2 vertex_uv1(uint vertex) {
+    return VERTEX_EXTRAS != 0 ? vertex_extras[vertex].uv1 : vec2(0.0);
 }
 
-// Octahedral decoding (Cigolle et al. 2014, "A survey of efficient representations of unit vectors").
-vec3 vertex_normal(Vertex v) {
-    vec2 f = unpackSnorm2x16(v.normal_oct);
-    vec3 n = vec3(f, 1.0 - abs(f.x) - abs(f.y));
-    if (n.z < 0.0) n.xy = (1.0 - abs(n.yx)) * vec2(n.x < 0.0 ? -1.0 : 1.0, n.y < 0.0 ? -1.0 : 1.0);
-    return normalize(n);
+vec4 vertex_color(uint vertex) {
+    if (VERTEX_EXTRAS == 0) return vec4(1.0);
+    return vec4(unpackUnorm2x16(vertex_extras[vertex].color_rg), unpackUnorm2x16(vertex_extras[vertex].color_ba));
 }

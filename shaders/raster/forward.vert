@@ -1,5 +1,5 @@
 // Multi-view rendering, one pass a view: a vertex through one view's off-axis frustum.
-// In: DisplayPositions, Vertices, LocalPositions (draw index). The window's sides clip, since the
+// In: DisplayPositions, vertex attributes, LocalPositions (draw index). The window's sides clip, since the
 // raster is a parallelogram around the window when views follow the lenses.
 
 #include "common/frame.glsl"
@@ -18,7 +18,7 @@ out vec3 p_world;
 out vec3 normal_world;
 out vec4 uv01;
 out vec4 color;
-flat out uint material_index;
+flat out uint material;
 
 out gl_PerVertex {
     vec4 gl_Position;
@@ -27,8 +27,6 @@ out gl_PerVertex {
 
 void main() {
     vec4 p_display = vec4(display_positions[gl_VertexID].xyz, 1.0);
-    Vertex vertex = vertices[gl_VertexID];
-    Draw draw = draws[floatBitsToUint(local_positions[gl_VertexID].w)];
 
     gl_Position = clip_from_display * p_display;
     float d = frame.distance_mm - p_display.z;
@@ -37,8 +35,8 @@ void main() {
     gl_ClipDistance[1] = 0.5 * frame.panel_width_mm * d - x_times_d;
 
     p_world = (world_from_display * p_display).xyz;
-    normal_world = mat3(draw.normal_matrix_x.xyz, draw.normal_matrix_y.xyz, draw.normal_matrix_z.xyz) * vertex_normal(vertex);
-    uv01 = vec4(vertex.uv0, vertex.uv1);
-    color = vertex_color(vertex);
-    material_index = draw.material;
+    normal_world = direction_from(world_normals[gl_VertexID]);
+    uv01 = vec4(tex_coords[gl_VertexID], vertex_uv1(uint(gl_VertexID)));
+    color = vertex_color(uint(gl_VertexID));
+    material = draws[floatBitsToUint(local_positions[gl_VertexID].w)].material;
 }

@@ -1,7 +1,7 @@
 // How long a point may be along its row: the texture-based limit, equations 1–3 of Gavane and
 // Watson 2024. Rows stay dense, since they are shared by all views.
 
-#include "common/slots.glsl"
+#include "common/material.glsl"
 #include "common/vertices.glsl"
 #include "common/hash.glsl"
 
@@ -29,16 +29,12 @@ bool stochastically_kept(uint triangle_id, Plane plane, float side) {
 
 float point_columns(uvec4 triangle, Plane plane, float side) {
     // Equation 1: n_tex, the most texels that any texture lays on the triangle.
-    Vertex a = vertices[triangle.x], b = vertices[triangle.y], c = vertices[triangle.z];
-    vec2 area_ts = vec2(area(a.uv0, b.uv0, c.uv0), area(a.uv1, b.uv1, c.uv1));
-    float texels = 0.0;
-    for (uint role = 0u; role < TEXTURE_ROLES; role++) {
-        TextureSlot slot = slot_of(draws[triangle.w].material, role);
-        if (slot.group < 0) continue;
-        vec4 m = slot.uv_matrix;
-        texels = max(texels, area_ts[slot.texcoord] * abs(m.x * m.w - m.y * m.z)
-                                 * slot.texels.x * slot.texels.y);
-    }
+    uint material = draws[triangle.w].material;
+    float texels = materials[material].texels_uv0
+        * area(tex_coords[triangle.x], tex_coords[triangle.y], tex_coords[triangle.z]);
+    if (VERTEX_EXTRAS != 0)
+        texels = max(texels, materials[material].texels_uv1
+            * area(vertex_uv1(triangle.x), vertex_uv1(triangle.y), vertex_uv1(triangle.z)));
     if (texels == 0.0) return MOST_COLUMNS;
 
     // Equation 2: size_uv, a texel's area on the triangle.

@@ -1,90 +1,67 @@
-// Splat points into all views by the shear identity. A lane is a view; a work group takes
-// GROUP_ITEMS consecutive rows of visible triangles. On each row the triangle is a slice; its points
-// are cells of the densest eye's columns, and a point's footprint in a view, cut to the triangle
+// Splat points into all views by the shear identity. A work group takes GROUP_ITEMS consecutive items
+// and prepares them together; then a lane is a view. A point's footprint in a view, cut to the triangle
 // (the inside-triangle test of Gavane and Watson 2023, section 3.3), is an interval of columns whose
 // ends move linearly with the eye.
-// In: the batch, Spans, VisibleTriangles, Work, Eyes (columns), RowOffsets. Out: Depths or Words.
+// In: the batch, its points, Eyes (columns), RowOffsets. Out: Depths or Words.
 
 layout(local_size_x = VIEW_LANES) in;
 
-#include "common/triangles.glsl"
-#include "common/shear.glsl"
-#include "common/plane.glsl"
+#include "splat/items.glsl"
 #include "common/alpha.glsl"
 #include "splat/visit.glsl"
-#include "splat/items.glsl"
 
-layout(std430) readonly restrict buffer RowOffsets { float row_offsets[]; };
+layout(std430) readonly restrict buffer Eyes { float eyes[]; };  // in columns, view 0 first
 
-struct Target {
-    int view;
-    float eye;     // of this lane, in columns
-    float eye_mm;
-    float side;    // of this lane's eye
-};
-
-void visit_columns(int first, int end, int row, Target target, Plane plane, uint triangle) {
-    float y_mm = row_centre_mm(row);
-    for (int column = max(first, 0); column < min(end, frame.columns); column++) {
-        float x_mm = (float(column) + 0.5 - row_offsets[row]) * frame.column_mm;
-        if (ALPHA_TESTED != 0 && !alpha_accepts(triangle, plane, target.eye_mm, x_mm, y_mm, ivec3(column, row, target.view)))
-            continue;
-        float depth = plane_depth(plane, target.side, target.eye_mm, x_mm, y_mm);
-        visit(view_pixel(row, target.view, column), depth, frame.triangle_base + triangle);
-    }
-}
+shared PointRow items[GROUP_ITEMS];
 
 // First column whose centre is not left of a position: centres on a left edge are inside.
 int column_cut(float column) {
     return int(ceil(clamp(column, -1e6, 1e6) - 0.5));
 }
 
-// The points of one slice: cell boundaries at multiples of `cell` columns of the densest eye.
-void splat_slice(Slice slice, int row, float cell, float densest_eye, Target target, Plane plane, uint triangle) {
-    float from = column_from(slice.a, densest_eye), to = column_from(slice.b, densest_eye);
-    if (from > to) {
-        SliceEnd end = slice.a; slice.a = slice.b; slice.b = end;
-        float column = from; from = to; to = column;
+void visit_columns(int first, int end, PointRow points, int view, float eye_mm) {
+    float y_mm = row_centre_mm(points.row);
+    float offset = row_offsets[points.row] - 0.5;
+    for (int column = max(first, 0); column < min(end, frame.columns); column++) {
+        float x_mm = (float(column) - offset) * frame.column_mm;
+        if (ALPHA_TESTED != 0 && !alpha_accepts(points.triangle, points.plane, eye_mm, x_mm, y_mm, ivec3(column, points.row, view)))
+            continue;
+        float depth = plane_depth(points.plane, eye_mm, x_mm, y_mm);
+        visit(view_pixel(points.row, view, column), depth, frame.triangle_base + points.triangle);
     }
-    int first_cell = int(floor(from / cell)), end_cell = int(ceil(to / cell));
-    int cut = column_cut(column_from(slice.a, target.eye));
-    int cut_last = column_cut(column_from(slice.b, target.eye));
-    float toward_per_column = (slice.b.toward - slice.a.toward) / (to - from);
-    for (int point = first_cell + 1; point < end_cell; point++) {
-        float boundary = float(point) * cell;
-        float toward = slice.a.toward + (boundary - from) * toward_per_column;
-        int next = column_cut(boundary + toward * (target.eye - densest_eye));
-        next = clamp(next, min(cut, cut_last), max(cut, cut_last));
-        visit_columns(min(cut, next), max(cut, next), row, target, plane, triangle);
+}
+
+// The points of a row, from cell boundary to cell boundary. In a boundary's own (densest) view it lies
+// at a multiple of the cell, and 1 − k is linear along the slice there; other views shear it.
+void splat_row(PointRow points, int view, float eye, float eye_mm) {
+    int cut = column_cut(column_from(points.slice.a, eye));
+    int cut_last = column_cut(column_from(points.slice.b, eye));
+    int low = min(cut, cut_last), high = max(cut, cut_last);
+    float toward_per_column = (points.slice.b.toward - points.slice.a.toward) / (points.to - points.from);
+    int end_cell = int(ceil(points.to / points.cell));
+    for (int cell = int(floor(points.from / points.cell)) + 1; cell < end_cell; cell++) {
+        float boundary = float(cell) * points.cell;
+        float toward = points.slice.a.toward + (boundary - points.from) * toward_per_column;
+        int next = clamp(column_cut(boundary + toward * (eye - points.densest_eye)), low, high);
+        visit_columns(min(cut, next), max(cut, next), points, view, eye_mm);
         cut = next;
     }
-    visit_columns(min(cut, cut_last), max(cut, cut_last), row, target, plane, triangle);
+    visit_columns(min(cut, cut_last), max(cut, cut_last), points, view, eye_mm);
 }
 
 void main() {
-    Target target;
-    target.view = int(gl_WorkGroupID.z * VIEW_LANES + gl_LocalInvocationID.x);
-    if (target.view >= frame.views) return;
-    target.eye = eyes[target.view];
-    target.eye_mm = target.eye * frame.column_mm;
+    uint first = first_item();
+    uint count = min(GROUP_ITEMS, work.items - min(first, work.items));
+    for (uint item = gl_LocalInvocationID.x; item < count; item += VIEW_LANES)
+        items[item] = point_row(first + item);
+    barrier();
 
-    uint item = first_item(), end = min(item + GROUP_ITEMS, work.items);
-    for (uint v = visible_at(item); item < end; v++) {
-        uint triangle = visible[v].triangle;
-        uint last = min(end, v + 1u < work.visible ? visible[v + 1u].first_item : work.items);
-        uvec4 corners = triangles[triangle];
-        vec3 a = display_positions[corners.x].xyz;
-        vec3 b = display_positions[corners.y].xyz;
-        vec3 c = display_positions[corners.z].xyz;
-        Plane plane = triangle_plane(a, b, c);
-        target.side = eye_side(plane, target.eye_mm);
-        float densest_eye = densest_eye_columns(plane);
-        bool seen = faces(draws[corners.w].facing, target.side);
-        Span span = spans[triangle];
-        for (int row = int((span.rows & 0xFFFFu) + item - visible[v].first_item); item < last; item++, row++) {
-            Slice slice = slice_triangle(a, b, c, row, row_offsets[row]);
-            if (slice.exists && seen)
-                splat_slice(slice, row, span.point_columns, densest_eye, target, plane, triangle);
-        }
+    int view = int(gl_WorkGroupID.z * VIEW_LANES + gl_LocalInvocationID.x);
+    if (view >= frame.views) return;
+    float eye = eyes[view], eye_mm = eye * frame.column_mm;
+    for (uint item = 0u; item < count; item++) {
+        PointRow points = items[item];
+        if (points.slice.exists && faces(points.facing, eye_side(points.plane, eye_mm)))
+            splat_row(points, view, eye, eye_mm);
     }
 }

@@ -1,0 +1,32 @@
+// The blocks of BLOCK columns that show triangles of a batch: a software device runs all that a branch
+// skips, and backgrounds are large. The order of the list varies; what it leads to does not.
+// In: Words. Out: Blocks, BlockWork.
+
+layout(local_size_x = 64) in;
+
+#include "common/frame.glsl"
+#include "layout/BlockWork"
+
+layout(std430) readonly restrict buffer Words { uint words[]; };
+layout(std430) writeonly restrict buffer Blocks { uint blocks[]; };
+layout(std430) restrict buffer BlockWorkBlock { BlockWork block_work; };
+
+uniform uint block_count;   // of the band
+uniform uint row_blocks;    // of one row of one view
+uniform uint groups_across; // work groups of the dispatch along x
+
+void main() {
+    uint block = gl_GlobalInvocationID.y * groups_across * 64u + gl_GlobalInvocationID.x;
+    if (block >= block_count) return;
+    uint line = block / row_blocks, first = (block % row_blocks) * BLOCK;
+    uint end = min(first + BLOCK, uint(frame.columns));
+    bool any_here = false;
+    // Background is no triangle of any batch, since ids end far below it.
+    for (uint column = first; column < end; column++)
+        any_here = any_here || words[line * uint(frame.columns) + column] - frame.triangle_base < frame.triangles;
+    if (!any_here) return;
+    uint place = atomicAdd(block_work.blocks, 1u), group = place / GROUP_BLOCKS;
+    blocks[place] = block;
+    atomicMax(block_work.groups_x, min(group + 1u, GROUPS_ACROSS));
+    atomicMax(block_work.groups_y, group / GROUPS_ACROSS + 1u);
+}
