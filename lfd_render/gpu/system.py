@@ -167,27 +167,25 @@ def _privilege() -> list[str] | None:
     if os.geteuid() == 0:
         return []
     sudo = ["sudo", "-n"]
-    permitted = shutil.which("sudo") and _run([*sudo, "true"], quiet=True)
+    permitted = shutil.which("sudo") and _run([*sudo, "true"])
     return sudo if permitted else None
 
 
-def _run(command: Sequence[str], quiet: bool = False) -> bool:
-    output = subprocess.DEVNULL if quiet else None
-    return (
-        subprocess.run(
-            command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, check=False
-        ).returncode
-        == 0
+def _run(command: Sequence[str], errors: bool = False) -> bool:
+    """Run a command without input; whether it succeeded. Of its output only errors may show."""
+    stderr = None if errors else subprocess.DEVNULL
+    done = subprocess.run(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=stderr, check=False
     )
+    return done.returncode == 0
 
 
 def _install(packages: Sequence[str], privilege: Sequence[str]) -> bool:
     """Install by apt; the package lists are fetched only when they lack a package or are stale."""
     apt = [*privilege, "env", "DEBIAN_FRONTEND=noninteractive"]
     install = [*apt, *_INSTALL, *_PATIENCE, *packages]
-    if _run(install, quiet=True):
-        return True
-    return _run([*apt, "apt-get", "update", "-q", *_PATIENCE]) and _run([*install, "-q"])
+    update = [*apt, "apt-get", "update", *_PATIENCE]
+    return _run(install) or (_run(update, errors=True) and _run(install, errors=True))
 
 
 def advice(packages: Sequence[str]) -> str:
@@ -208,7 +206,7 @@ def main(requests: Sequence[str]) -> int:
         print(f"Installing system packages: {' '.join(packages)}", file=sys.stderr, flush=True)
         if _install(packages, privilege):
             # A fresh process, because this one's loader remembers which libraries were missing.
-            return int(not _run([sys.executable, __file__, "--check", *requests]))
+            return int(not _run([sys.executable, __file__, "--check", *requests], errors=True))
     return _report(missing, requests)
 
 
