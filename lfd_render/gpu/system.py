@@ -191,7 +191,8 @@ def _install(packages: Sequence[str], privilege: Sequence[str]) -> bool:
 def advice(packages: Sequence[str]) -> str:
     """What a person does to get packages, on this system."""
     if shutil.which("apt-get"):
-        return f"Install it with:\n  {apt_command(packages)}"
+        who = "" if os.geteuid() == 0 or shutil.which("sudo") else "as root "
+        return f"Install it {who}with:\n  {apt_command(packages)}"
     if platform.system() == "Darwin":
         return "macOS stops at OpenGL 4.1, without compute shaders: use a Linux machine."
     return f"Install what Debian calls {' '.join(packages)} with this system's package manager."
