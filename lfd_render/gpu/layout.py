@@ -88,13 +88,38 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("uint", "triangle"),  # within its batch
         ("uint", "first_item"),
     ),
-    # Counts of the sampler: the first three words dispatch the splatter.
+    # A window of the items (rows of visible triangles), as many as one buffer of rows holds: what
+    # dispatches the splatter, what dispatches the sampler's last step, and which items they are.
     "Work": (
-        ("uint", "groups_x"),
-        ("uint", "groups_y"),
-        ("uint", "groups_z"),
-        ("uint", "visible"),
-        ("uint", "items"),  # rows of visible triangles
+        ("uint", "splat_x"),
+        ("uint", "splat_y"),
+        ("uint", "splat_z"),
+        ("uint", "rows_x"),
+        ("uint", "rows_y"),
+        ("uint", "rows_z"),
+        ("uint", "first_item"),
+        ("uint", "items"),
+        ("uint", "visible"),  # triangles of all windows
+    ),
+    # A triangle on one row, ready for all views: the slice's ends (column = a_column + a_toward·eye),
+    # the plane, and the points along it, cells of the densest eye's columns.
+    "PointRow": (
+        ("float", "a_column"),
+        ("float", "a_toward"),
+        ("float", "b_column"),
+        ("float", "b_toward"),
+        ("float", "normal_x"),
+        ("float", "normal_y"),
+        ("float", "normal_z"),
+        ("float", "at_centre"),
+        ("float", "depth_near"),
+        ("float", "depth_far"),
+        ("float", "densest_eye"),  # in columns
+        ("float", "cell"),  # length of a point, in columns
+        ("uint", "triangle"),  # within its batch
+        ("uint", "row"),
+        ("uint", "facing"),
+        ("float", "row_offset"),  # column of window x = 0 on this row
     ),
     # Counts of the list of blocks to shade: the first three words dispatch.
     "BlockWork": (
@@ -111,6 +136,7 @@ CONSTANTS: dict[str, int] = {
     "FACING_BOTH": 2,  # bit: double-sided
     "TEXTURE_ROLES": len(TEXTURE_ROLES),
     "NO_TRIANGLE": 0xFFFFFFFF,  # the word of a view pixel that shows the background
+    "FACING_NOWHERE": 4,
     "ALPHA_OPAQUE": 0,
     "ALPHA_MASK": 1,
     "ALPHA_BLEND": 2,

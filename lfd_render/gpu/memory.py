@@ -161,3 +161,37 @@ class TextureArray:
         """Give the memory back. The texture must not be used afterwards."""
         self._device.ledger.add(self.label, -self.size)
         self._device.raw.glDeleteTextures(1, ctypes.byref(ctypes.c_uint(self.name)))
+
+
+class TableTexture:
+    """A table of four 32-bit words an entry, read by texelFetch: device memory that software devices
+    gather from faster than from storage blocks."""
+
+    def __init__(self, device: Device, label: str, words: NDArray[np.uint32]) -> None:
+        """words: uint32 [n, 4], n at most the device's texture size."""
+        assert words.ndim == 2 and words.shape[1] == 4
+        self.label = label
+        self.size = words.nbytes
+        self._device = device
+        name = ctypes.c_uint()
+        raw = device.raw
+        raw.glCreateTextures(gl.TEXTURE_2D, 1, ctypes.byref(name))
+        self.name = int(name.value)
+        data = np.ascontiguousarray(words)
+        raw.glTextureStorage2D(self.name, 1, gl.RGBA32UI, len(words), 1)
+        raw.glTextureSubImage2D(
+            self.name, 0, 0, 0, len(words), 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, data.ctypes.data
+        )
+        raw.glTextureParameteri(self.name, gl.TEXTURE_MIN_FILTER, gl.NEAREST)
+        raw.glTextureParameteri(self.name, gl.TEXTURE_MAG_FILTER, gl.NEAREST)
+        device.check()
+        device.ledger.add(label, self.size)
+
+    def bind(self, unit: int) -> None:
+        """Make the table what samplers of this unit read."""
+        self._device.raw.glBindTextureUnit(unit, self.name)
+
+    def release(self) -> None:
+        """Give the memory back. The table must not be used afterwards."""
+        self._device.ledger.add(self.label, -self.size)
+        self._device.raw.glDeleteTextures(1, ctypes.byref(ctypes.c_uint(self.name)))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import moderngl
 
 from lfd_render.errors import GpuError
-from lfd_render.gpu.memory import Buffer, TextureArray
+from lfd_render.gpu.memory import Buffer, TableTexture, TextureArray
 from lfd_render.gpu.shaders import Source, assemble
 
 if TYPE_CHECKING:
@@ -20,7 +20,8 @@ _DECLARATION = re.compile(r"\b(?:buffer|uniform)\s+(?:\w+\s+)?(\w+)\s*(?:\[[^\]]
 _IMAGE = re.compile(r"\bimage\w+\s+(\w+)\s*;")
 
 Uniform = int | float | tuple[Any, ...] | bytes
-Samplers = Mapping[str, "TextureArray | list[TextureArray]"]
+Texture = TextureArray | TableTexture
+Samplers = Mapping[str, "Texture | list[TextureArray]"]
 
 
 class _Program:
@@ -84,7 +85,7 @@ class _Program:
         for name, textures in samplers.items():
             if name not in self._uniforms:
                 continue
-            group = textures if isinstance(textures, list) else [textures]
+            group: Sequence[Texture] = textures if isinstance(textures, list) else [textures]
             for offset, texture in enumerate(group):
                 texture.bind(unit + offset)
             units = list(range(unit, unit + len(group)))

@@ -4,7 +4,11 @@ import ctypes
 from typing import Any
 
 # moderngl 5.13 has no internal format for arrays and no layered depth; these calls fill the gap.
+TEXTURE_2D = 0x0DE1
 TEXTURE_2D_ARRAY = 0x8C1A
+RGBA32UI = 0x8D70
+RGBA_INTEGER = 0x8D99
+UNSIGNED_INT = 0x1405
 SRGB8_ALPHA8 = 0x8C43
 RGBA8 = 0x8058
 RGBA16F = 0x881A
@@ -59,6 +63,8 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "glGetIntegerv": (None, (_u, _p)),
     "glCreateTextures": (None, (_u, _i, _p)),
     "glDeleteTextures": (None, (_i, _p)),
+    "glTextureStorage2D": (None, (_u, _i, _u, _i, _i)),
+    "glTextureSubImage2D": (None, (_u, _i, _i, _i, _i, _i, _u, _u, _p)),
     "glTextureStorage3D": (None, (_u, _i, _u, _i, _i, _i)),
     "glTextureSubImage3D": (None, (_u, _i, _i, _i, _i, _i, _i, _i, _u, _u, _p)),
     "glTextureParameteri": (None, (_u, _u, _i)),

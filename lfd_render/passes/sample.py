@@ -1,4 +1,4 @@
-"""Sampling: triangles → the rows of visible triangles, whose points are enumerated, not stored."""
+"""Sampling: triangles → rows of points."""
 
 from __future__ import annotations
 
@@ -14,32 +14,37 @@ from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.view_target import Band, ViewTarget
 
 SEGMENT = 64  # triangles a thread of the prefix sum takes
-GROUP_ITEMS = 32  # rows of triangles a work group of the splatter takes
 GROUPS_ACROSS = 32768  # work groups along x before y grows
-_GROUP = 128  # local_size_x of sample/span.comp
+MOST_WINDOW_ITEMS = 1 << 20  # rows of points that one buffer holds: 64 MiB
+_HEADROOM = 1.25  # of a window over the items found, so that a moving scene rarely outgrows it
+_SPAN_GROUP = 128  # local_size_x of sample/span.comp
 _SEGMENT_GROUP = 64  # local_size_x of sample/sum.comp and sample/compact.comp
+_ROWS_DISPATCH = 12  # byte offset of rows_x within Work
 
 
-@dataclass(frozen=True)
+@dataclass
 class PointCloud:
-    """Points of one batch and band, enumerated: a visible triangle's rows, and on each row the
-    cells of the densest eye's columns. Bounded by the triangle count, so nothing overflows.
+    """Points of one batch and band. spans: Span [triangle]; visible: Visible [≤ triangles]; rows:
+    PointRow [≤ window_items], one window of the items at a time; work: Work [window].
 
-    spans: Span [triangle]; visible: Visible [≤ triangles], in triangle order; work: one Work.
+    A row holds the points of one triangle on one window row: cells, `cell` columns long, of the
+    densest eye's columns, which need no storage of their own.
     """
 
     spans: Buffer
     visible: Buffer
-    work: Buffer
     segments: Buffer
-
-    def blocks(self) -> dict[str, Buffer]:
-        """What splatting reads, by block name."""
-        return {"Spans": self.spans, "VisibleTriangles": self.visible, "WorkBlock": self.work}
+    most_items: Buffer
+    rows: Buffer
+    work: Buffer
+    window_items: int
+    windows: int
 
     def release(self) -> None:
         """Free the buffers."""
-        for buffer in (self.spans, self.visible, self.work, self.segments):
+        for buffer in (
+            self.spans, self.visible, self.segments, self.most_items, self.rows, self.work,
+        ):  # fmt: skip
             buffer.release()
 
 
@@ -47,7 +52,8 @@ class Sample:
     """Batch, ViewTarget → PointCloud.
 
     Clips at the near plane, culls triangles that no view faces or that reach no row centre, sets
-    each triangle's point length (Gavane and Watson 2024, section 3.1) and sums the rows.
+    each triangle's point length (Gavane and Watson 2024, section 3.1), sums the rows and writes
+    them out.
     """
 
     def __init__(
@@ -59,12 +65,9 @@ class Sample:
         stochastic_culling: bool = False,
     ) -> None:
         self._device = device
+        self._scene = scene
         self._view_lanes = view_lanes
-        constants = {
-            "SEGMENT": SEGMENT,
-            "GROUP_ITEMS": GROUP_ITEMS,
-            "GROUPS_ACROSS": GROUPS_ACROSS,
-        }
+        constants = {"SEGMENT": SEGMENT, "GROUPS_ACROSS": GROUPS_ACROSS}
         self._span = Kernel(
             device,
             "sample/span.comp",
@@ -73,45 +76,76 @@ class Sample:
         self._sum = Kernel(device, "sample/sum.comp", constants)
         self._scan = Kernel(device, "sample/scan.comp", constants)
         self._compact = Kernel(device, "sample/compact.comp", constants)
+        self._rows = Kernel(device, "sample/rows.comp", constants)
         self._count = Kernel(device, "sample/count.comp", constants)
         self._total = Buffer(device, "points", 4)
 
     def allocate(self, batch: Batch) -> PointCloud:
-        """Buffers for a batch's points: 16 bytes a triangle."""
+        """Buffers for a batch's points, with room for one row until `fit` enlarges it."""
         segments = -(-batch.triangles // SEGMENT)
-        return PointCloud(
+        points = PointCloud(
             spans=Buffer(self._device, "points", dtype("Span").itemsize * batch.triangles),
             visible=Buffer(self._device, "points", dtype("Visible").itemsize * batch.triangles),
-            work=Buffer(self._device, "points", dtype("Work").itemsize),
             segments=Buffer(self._device, "points", 8 * segments),
+            most_items=Buffer(self._device, "points", 4),
+            rows=Buffer(self._device, "point rows", dtype("PointRow").itemsize),
+            work=Buffer(self._device, "points", dtype("Work").itemsize),
+            window_items=1,
+            windows=1,
         )
+        points.most_items.fill(0)
+        return points
 
-    def __call__(
-        self, scene: SceneBuffers, batch: Batch, target: ViewTarget, band: Band, points: PointCloud
-    ) -> None:
-        """Fill `points` for one batch and band."""
+    def fit(self, points: PointCloud) -> bool:
+        """Enlarge the windows if the frames since the last call had more items than they hold.
+
+        Returns whether they were too small, so that what was rendered must be rendered again.
+        Waits for the device: call it when a frame is done.
+        """
+        most = int(points.most_items.read(np.uint32)[0])
+        points.most_items.fill(0)
+        if most <= points.window_items * points.windows:
+            return False
+        wanted = int(most * _HEADROOM)
+        points.window_items = min(wanted, MOST_WINDOW_ITEMS)
+        points.windows = -(-wanted // points.window_items)
+        points.rows.release()
+        points.work.release()
+        row_bytes = dtype("PointRow").itemsize * points.window_items
+        points.rows = Buffer(self._device, "point rows", row_bytes)
+        points.work = Buffer(self._device, "points", dtype("Work").itemsize * points.windows)
+        return True
+
+    def __call__(self, batch: Batch, target: ViewTarget, band: Band, points: PointCloud) -> None:
+        """Sample one batch and band: all but the rows, window by window."""
         frame = {"FrameBlock": target.frame(band, batch)}
         self._span.set(
             {
                 **batch.geometry(),
-                **frame,
-                "Draws": scene.draws,
                 **batch.attributes(),
-                **scene.materials_of(),
+                **self._scene.materials_of(),
+                **frame,
+                "Draws": self._scene.draws,
                 "Spans": points.spans,
             }
         )
-        self._span.run((-(-batch.triangles // _GROUP), 1, 1))
+        self._span.run((-(-batch.triangles // _SPAN_GROUP), 1, 1))
 
         segments = -(-batch.triangles // SEGMENT)
         groups = (-(-segments // _SEGMENT_GROUP), 1, 1)
         self._sum.set({**frame, "Spans": points.spans, "Segments": points.segments})
         self._sum.run(groups)
         self._scan.set(
-            {"Segments": points.segments, "WorkBlock": points.work},
+            {
+                "Segments": points.segments,
+                "WorkBlock": points.work,
+                "MostItems": points.most_items,
+            },
             {
                 "segment_count": segments,
                 "view_blocks": -(-target.rig.views // self._view_lanes),
+                "windows": points.windows,
+                "window_items": points.window_items,
             },
         )
         self._scan.run((1, 1, 1))
@@ -125,27 +159,46 @@ class Sample:
         )
         self._compact.run(groups)
 
-    def count(
-        self, scene: SceneBuffers, batch: Batch, target: ViewTarget, band: Band, points: PointCloud
-    ) -> int:
-        """Points of one batch and band. Samples, counts and waits: not for a frame."""
-        self(scene, batch, target, band, points)
-        self._total.fill(0)
-        self._count.set(
+    def rows(
+        self, batch: Batch, target: ViewTarget, band: Band, points: PointCloud, window: int
+    ) -> None:
+        """Write the rows of one window of items."""
+        self._rows.set(
             {
                 **batch.geometry(),
-                **points.blocks(),
-                "Draws": scene.draws,
+                "Draws": self._scene.draws,
                 "FrameBlock": target.frame(band, batch),
+                "Spans": points.spans,
+                "VisibleTriangles": points.visible,
+                "WorkBlock": points.work,
                 "RowOffsets": target.row_offsets,
-                "PointCount": self._total,
-            }
+                "PointRows": points.rows,
+            },
+            {"window": window},
         )
-        self._count.run_indirect(points.work)
+        self._rows.run_indirect(points.work, window * dtype("Work").itemsize + _ROWS_DISPATCH)
+
+    def count(self, batch: Batch, target: ViewTarget, band: Band, points: PointCloud) -> int:
+        """Points of one batch and band. Samples, counts and waits: not for a frame."""
+        self._total.fill(0)
+        self(batch, target, band, points)
+        for window in range(points.windows):
+            self.rows(batch, target, band, points, window)
+            self._count.set(
+                {
+                    "FrameBlock": target.frame(band, batch),
+                    "PointRows": points.rows,
+                    "WorkBlock": points.work,
+                    "PointCount": self._total,
+                },
+                {"window": window},
+            )
+            self._count.run_indirect(points.work, window * dtype("Work").itemsize + _ROWS_DISPATCH)
         return int(self._total.read(np.uint32)[0])
 
     def release(self) -> None:
         """Free the kernels."""
-        for kernel in (self._span, self._sum, self._scan, self._compact, self._count):
-            kernel.release()
-        self._total.release()
+        for owner in (
+            self._span, self._sum, self._scan, self._compact, self._rows, self._count, self._total,
+        ):  # fmt: skip
+            owner.release()

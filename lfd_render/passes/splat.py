@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from lfd_render.gpu.device import Device
-from lfd_render.gpu.layout import CONSTANTS
+from lfd_render.gpu.layout import CONSTANTS, dtype
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
-from lfd_render.passes.sample import GROUP_ITEMS, GROUPS_ACROSS, PointCloud
+from lfd_render.passes.sample import GROUPS_ACROSS, PointCloud
 from lfd_render.passes.view_target import Band, ViewTarget
 
 _FARTHEST = 0x7F800000  # +∞ as a float's bits
@@ -48,7 +48,6 @@ class Splat:
     def __init__(self, device: Device, scene: SceneBuffers, view_lanes: int) -> None:
         constants = {
             "VIEW_LANES": view_lanes,
-            "GROUP_ITEMS": GROUP_ITEMS,
             "GROUPS_ACROSS": GROUPS_ACROSS,
             **scene.constants(),
         }
@@ -64,22 +63,35 @@ class Splat:
         }
 
     def depths(
-        self, batch: Batch, points: PointCloud, target: ViewTarget, band: Band, views: ViewBuffers
+        self,
+        batch: Batch,
+        points: PointCloud,
+        window: int,
+        target: ViewTarget,
+        band: Band,
+        views: ViewBuffers,
     ) -> None:
-        """Lower each pixel's depth to this batch's nearest."""
-        self._run(_DEPTH, batch, points, target, band, views)
+        """Lower each pixel's depth to the nearest of a window of points."""
+        self._run(_DEPTH, batch, points, window, target, band, views)
 
     def winners(
-        self, batch: Batch, points: PointCloud, target: ViewTarget, band: Band, views: ViewBuffers
+        self,
+        batch: Batch,
+        points: PointCloud,
+        window: int,
+        target: ViewTarget,
+        band: Band,
+        views: ViewBuffers,
     ) -> None:
-        """Set each pixel's word to the smallest id at its depth. All batches' depths come first."""
-        self._run(_WINNER, batch, points, target, band, views)
+        """Set each pixel's word to the smallest id at its depth. All depths come first."""
+        self._run(_WINNER, batch, points, window, target, band, views)
 
     def _run(
         self,
         step: int,
         batch: Batch,
         points: PointCloud,
+        window: int,
         target: ViewTarget,
         band: Band,
         views: ViewBuffers,
@@ -88,19 +100,20 @@ class Splat:
         kernel.set(
             {
                 **batch.geometry(),
-                **points.blocks(),
+                **batch.attributes(),
                 **self._scene.materials_of(),
                 "Draws": self._scene.draws,
-                **batch.attributes(),
                 "FrameBlock": target.frame(band, batch),
+                "PointRows": points.rows,
+                "WorkBlock": points.work,
                 "Eyes": target.eyes,
-                "RowOffsets": target.row_offsets,
                 "Depths": views.depths,
                 "Words": views.words,
             },
-            samplers=self._scene.samplers(),
+            {"window": window},
+            self._scene.samplers(),
         )
-        kernel.run_indirect(points.work)
+        kernel.run_indirect(points.work, window * dtype("Work").itemsize)
 
     def release(self) -> None:
         """Free the kernels."""

@@ -9,7 +9,8 @@ from lfd_render.display import DisplayProfile, ViewGrid
 from lfd_render.gpu import raw as gl
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.framebuffer import LayerTarget
-from lfd_render.gpu.memory import Buffer, TextureArray
+from lfd_render.gpu.memory import TableTexture, TextureArray
+from lfd_render.gpu.programs import Uniform
 from lfd_render.passes.screen import ScreenPass
 from lfd_render.passes.view_target import Band, ViewTarget
 
@@ -24,36 +25,44 @@ class Weave:
     def __init__(self, device: Device, profile: DisplayProfile, grid: ViewGrid, views: int) -> None:
         self._profile = profile
         self._grid = grid
-        self._pass = ScreenPass(
-            device, "weave/weave.frag", {"LINEAR_COLUMNS": int(grid.kind == "upright")}
-        )
-        tables = profile.phase_tables()
-        self._pattern_mode = tables.pattern_mode
-        self._buffers = {
-            "ColumnPhases": _phase_buffer(device, tables.column, views),
-            "RowPhases": _phase_buffer(device, tables.row, views),
-            "CellPhases": _phase_buffer(device, tables.cell, views),
-        }
-        self._columns_per_lens, row_columns = lens_columns(profile, grid)
-        self._buffers["RowColumns"] = Buffer.of(device, "weave", row_columns.astype(np.float32))
         width, height = profile.resolution_px
+        tables = profile.phase_tables()
+        columns_per_lens, lens_0 = lens_columns(profile, grid)
+        self._pass = ScreenPass(
+            device,
+            "weave/weave.frag",
+            {
+                "LINEAR_COLUMNS": int(grid.kind == "upright"),
+                "PATTERN_MODE": tables.pattern_mode,
+                "CELL_KINDS": len(tables.cell),
+            },
+        )
+        self._tables = {
+            "column_table": _table(device, phase_words(tables.column[:, 0], views)),
+            "row_table": _table(
+                device, phase_words(tables.row, views), lens_0.astype(np.float32).view(np.uint32)
+            ),
+        }
+        # Channels differ by the same phase in every column, so one column is stored.
+        subpixel = tables.cell + (tables.column[0] - tables.column[0, 0])
+        self._uniforms: dict[str, Uniform] = {
+            "subpixel_phases": phase_words(subpixel, views).tobytes(),
+            "columns_per_lens": columns_per_lens,
+            "panel_px": (width, height),
+        }
         self.panel = TextureArray(device, "panel image", (width, height, 1), gl.RGBA16F)
         self.framebuffer = LayerTarget(device, self.panel, depth=False)
 
     def __call__(self, target: ViewTarget, band: Band) -> None:
         """Weave the panel rows that show this band."""
         width, height = self._profile.resolution_px
-        first, end = (-(-row * height // self._grid.rows) for row in (band.first, band.first + band.rows))
+        starts = self._grid.first_panel_rows(height)
         self.framebuffer.use(0)
         self._pass(
-            {**self._buffers, "FrameBlock": target.band_frame(band)},
-            {
-                "columns_per_lens": self._columns_per_lens,
-                "panel_px": (width, height),
-                "pattern_mode": self._pattern_mode,
-            },
-            {"view_images": target.images},
-            (first, end),
+            {"FrameBlock": target.band_frame(band)},
+            self._uniforms,
+            {**self._tables, "view_images": target.images},
+            (int(starts[band.first]), int(starts[band.first + band.rows])),
             width,
         )
 
@@ -64,8 +73,8 @@ class Weave:
 
     def release(self) -> None:
         """Free everything."""
-        for buffer in self._buffers.values():
-            buffer.release()
+        for table in self._tables.values():
+            table.release()
         self.framebuffer.release()
         self.panel.release()
         self._pass.release()
@@ -82,7 +91,7 @@ def lens_columns(
     height = profile.resolution_px[1]
     y = np.arange(height)
     if grid.kind == "lens":
-        view_row = np.minimum(y * grid.rows // height, grid.rows - 1)
+        view_row = np.minimum((2 * y + 1) * grid.rows // (2 * height), grid.rows - 1)
         return 1.0, 0.5 - grid.row_base[view_row]
     v = (height - y - 0.5) / height
     count = profile.lens_count
@@ -102,5 +111,12 @@ def phase_words(phases: NDArray[np.float64], views: int) -> NDArray[np.uint32]:
     )
 
 
-def _phase_buffer(device: Device, phases: NDArray[np.float64], views: int) -> Buffer:
-    return Buffer.of(device, "weave", phase_words(phases, views))
+def _table(
+    device: Device, phases: NDArray[np.uint32], third: NDArray[np.uint32] | None = None
+) -> TableTexture:
+    """Entries of a phase and, if given, one more word."""
+    words = np.zeros((len(phases), 4), np.uint32)
+    words[:, :2] = phases
+    if third is not None:
+        words[:, 2] = third
+    return TableTexture(device, "weave", words)

@@ -33,8 +33,17 @@ class Technique(Protocol):
     def begin(self, placement: Placement, clock: StageClock) -> None:
         """Start a frame: place the scene."""
 
+    def warm_up(self, clock: StageClock) -> None:
+        """Run all shaders once on little work, and make room for the points of this placement."""
+
     def render(self, band: Band, clock: StageClock) -> None:
         """Fill target.images with one band."""
+
+    def complete(self) -> bool:
+        """Whether the frame just rendered is whole; if not, render it again, now with room for all.
+
+        Waits for the device."""
+        ...
 
     def count_points(self) -> int:
         """Points of a whole frame at the last placement; 0 where there are none."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
-from lfd_render.gpu.scene_buffers import SceneBuffers
-from lfd_render.passes.sample import Sample
+from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
+from lfd_render.passes.sample import PointCloud, Sample
 from lfd_render.passes.shade import Shade
 from lfd_render.passes.splat import Splat, ViewBuffers, view_lanes
 from lfd_render.passes.transform import Transform
@@ -42,18 +42,28 @@ class Lfdpr:
             for batch in self._scene.batches:
                 self._transform(self._scene, batch)
 
+    def warm_up(self, clock: StageClock) -> None:
+        """Render one row, and sample all bands to learn how many points there are."""
+        self.render(self.target.warm_up_band, clock)
+        for band in self.target.bands:
+            for batch, points in self._batches():
+                self._sample(batch, self.target, band, points)
+        self.complete()
+
     def render(self, band: Band, clock: StageClock) -> None:
         """Sample, splat and shade one band of rows."""
-        batches = list(zip(self._scene.batches, self._points, strict=True))
         with clock.stage("sample"):
-            for batch, points in batches:
-                self._sample(self._scene, batch, self.target, band, points)
+            for batch, points in self._batches():
+                self._sample(batch, self.target, band, points)
+                self._sample.rows(batch, self.target, band, points, 0)
         with clock.stage("splat"):
             self._views.clear()
-            for batch, points in batches:
-                self._splat.depths(batch, points, self.target, band, self._views)
-            for batch, points in batches:
-                self._splat.winners(batch, points, self.target, band, self._views)
+            for splat in (self._splat.depths, self._splat.winners):
+                for batch, points in self._batches():
+                    for window in range(points.windows):
+                        if points.windows > 1:
+                            self._sample.rows(batch, self.target, band, points, window)
+                        splat(batch, points, window, self.target, band, self._views)
         with clock.stage("shade"):
             self._shade(
                 self.target,
@@ -63,13 +73,20 @@ class Lfdpr:
                 self._placement.background,
             )
 
+    def complete(self) -> bool:
+        """Whether the windows held all points since the last call; if not, they do from now on."""
+        return not any([self._sample.fit(points) for points in self._points])
+
     def count_points(self) -> int:
         """Points of all bands at the last placement. Samples again, outside any timing."""
         return sum(
-            self._sample.count(self._scene, batch, self.target, band, points)
+            self._sample.count(batch, self.target, band, points)
             for band in self.target.bands
-            for batch, points in zip(self._scene.batches, self._points, strict=True)
+            for batch, points in self._batches()
         )
+
+    def _batches(self) -> list[tuple[Batch, PointCloud]]:
+        return list(zip(self._scene.batches, self._points, strict=True))
 
     def release(self) -> None:
         """Free passes, points and view buffers."""

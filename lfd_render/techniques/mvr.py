@@ -28,13 +28,23 @@ class Mvr:
             for batch in self._scene.batches:
                 self._transform(self._scene, batch)
 
+    def warm_up(self, clock: StageClock) -> None:
+        """Rasterise one row of one view."""
+        self._rasterise(0, self.target.warm_up_band)
+
     def render(self, band: Band, clock: StageClock) -> None:
         """Rasterise each view's rows of the band."""
         with clock.stage("raster"):
             for view in range(self.target.rig.views):
-                self._raster(
-                    view, band, self._placement.world_from_display, self._placement.background
-                )
+                self._rasterise(view, band)
+
+    def _rasterise(self, view: int, band: Band) -> None:
+        placement = self._placement
+        self._raster(view, band, placement.world_from_display, placement.background)
+
+    def complete(self) -> bool:
+        """Rasterisation needs no room."""
+        return True
 
     def count_points(self) -> int:
         """Rasterisation has no points."""

@@ -1,5 +1,4 @@
-// The list of visible triangles with the number of rows before each: point rows, enumerated and
-// never stored, in the order of the triangles.
+// The list of visible triangles with the number of items (rows) before each, in their order.
 // In: Spans, Segments (exclusive sums). Out: VisibleTriangles.
 
 layout(local_size_x = 64) in;

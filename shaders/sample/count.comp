@@ -1,17 +1,17 @@
-// How many points the splatter enumerates: cells of the densest eye's columns that each slice touches.
-// Run only when someone asks. One thread an item.
-// In: the batch, its points. Out: PointCount.
+// How many points the rows of a window hold. Run only when someone asks; one thread a row.
+// In: PointRows, Work. Out: PointCount.
 
-layout(local_size_x = GROUP_ITEMS) in;
+layout(local_size_x = 64) in;
 
-#include "splat/items.glsl"
+#include "common/points.glsl"
 
 layout(std430) restrict buffer PointCount { uint point_count; };
 
 void main() {
-    uint item = first_item() + gl_LocalInvocationID.x;
-    if (gl_WorkGroupID.z > 0u || item >= work.items) return;  // z counts blocks of views
-    PointRow points = point_row(item);
-    if (!points.slice.exists) return;
-    atomicAdd(point_count, uint(max(1.0, ceil(points.to / points.cell) - floor(points.from / points.cell))));
+    uint place = (gl_WorkGroupID.y * GROUPS_ACROSS + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
+    if (place >= work[window].items) return;
+    PointRow points = point_rows[place];
+    Slice slice = row_slice(points);
+    ivec2 cells = row_cells(points, slice);
+    if (slice.a != slice.b) atomicAdd(point_count, uint(cells.y - cells.x));
 }

@@ -1,6 +1,7 @@
-// Exclusive prefix sum over the segments, in place, by one work group; then the counts that splatting
-// dispatches by, so that nothing is read back.
-// In, out: Segments. Out: Work.
+// Exclusive prefix sum over the segments, in place, by one work group; then the counts of each window
+// of items, by which the later steps dispatch themselves. Items beyond the windows are not lost:
+// MostItems tells the host, which enlarges the windows and repeats the frame.
+// In, out: Segments. Out: Work, MostItems.
 
 #define THREADS 256u
 layout(local_size_x = 256) in;
@@ -8,10 +9,13 @@ layout(local_size_x = 256) in;
 #include "layout/Work"
 
 layout(std430) restrict buffer Segments { uvec2 segments[]; };
-layout(std430) writeonly restrict buffer WorkBlock { Work work; };
+layout(std430) writeonly restrict buffer WorkBlock { Work work[]; };
+layout(std430) restrict buffer MostItems { uint most_items; };  // over all calls
 
 uniform uint segment_count;
 uniform uint view_blocks;
+uniform uint windows;
+uniform uint window_items;
 
 shared uvec2 sums[THREADS];
 
@@ -41,8 +45,14 @@ void main() {
 
     if (thread == THREADS - 1u) {
         uvec2 total = sums[thread];
-        uint groups = (total.y + GROUP_ITEMS - 1u) / GROUP_ITEMS;
-        uint across = min(groups, GROUPS_ACROSS);
-        work = Work(across, (groups + GROUPS_ACROSS - 1u) / GROUPS_ACROSS, view_blocks, total.x, total.y);
+        atomicMax(most_items, total.y);
+        for (uint w = 0u; w < windows; w++) {
+            uint begin = min(w * window_items, total.y), items = min(window_items, total.y - begin);
+            uint groups = (items + 63u) / 64u;
+            work[w] = Work(
+                min(items, GROUPS_ACROSS), (items + GROUPS_ACROSS - 1u) / GROUPS_ACROSS, view_blocks,
+                min(groups, GROUPS_ACROSS), (groups + GROUPS_ACROSS - 1u) / GROUPS_ACROSS, 1u,
+                begin, items, total.x);
+        }
     }
 }

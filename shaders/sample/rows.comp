@@ -1,0 +1,58 @@
+// The rows of points that splatting reads: one thread an item, an item being a row of a visible
+// triangle. The points on it are the cells, `cell` columns long, of the densest eye's columns.
+// In: the batch, Spans, VisibleTriangles, Work, RowOffsets. Out: PointRows, from the window's first.
+
+layout(local_size_x = 64) in;
+
+#include "common/triangles.glsl"
+#include "common/shear.glsl"
+#include "common/plane.glsl"
+#include "layout/Span"
+#include "layout/Visible"
+#include "layout/Work"
+#include "layout/PointRow"
+
+layout(std430) readonly restrict buffer Spans { Span spans[]; };
+layout(std430) readonly restrict buffer VisibleTriangles { Visible visible[]; };
+layout(std430) readonly restrict buffer WorkBlock { Work work[]; };
+layout(std430) readonly restrict buffer RowOffsets { float row_offsets[]; };
+layout(std430) writeonly restrict buffer PointRows { PointRow point_rows[]; };
+
+uniform int window;
+
+// Index of the visible triangle that holds an item: the last one that starts at or before it.
+uint visible_at(uint item) {
+    uint low = 0u, high = work[window].visible;
+    while (low + 1u < high) {
+        uint middle = (low + high) / 2u;
+        if (visible[middle].first_item <= item) low = middle;
+        else high = middle;
+    }
+    return low;
+}
+
+void main() {
+    uint place = (gl_WorkGroupID.y * GROUPS_ACROSS + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
+    if (place >= work[window].items) return;
+    uint item = work[window].first_item + place;
+    Visible seen = visible[visible_at(item)];
+    uvec4 corners = triangles[seen.triangle];
+    vec3 a = display_positions[corners.x].xyz;
+    vec3 b = display_positions[corners.y].xyz;
+    vec3 c = display_positions[corners.z].xyz;
+    Span span = spans[seen.triangle];
+    int row = int((span.rows & 0xFFFFu) + item - seen.first_item);
+
+    Plane plane = triangle_plane(a, b, c);
+    float densest_eye = densest_eye_columns(plane);
+    Slice slice = slice_triangle(a, b, c, row, row_offsets[row]);
+    if (!slice.exists) slice.a = slice.b = SliceEnd(0.0, 0.0);  // without points
+    // From left to right as the densest eye sees it.
+    if (column_from(slice.a, densest_eye) > column_from(slice.b, densest_eye)) {
+        SliceEnd end = slice.a; slice.a = slice.b; slice.b = end;
+    }
+    point_rows[place] = PointRow(
+        slice.a.at_centre, slice.a.toward, slice.b.at_centre, slice.b.toward,
+        plane.normal.x, plane.normal.y, plane.normal.z, plane.at_centre, plane.depths.x, plane.depths.y,
+        densest_eye, span.point_columns, seen.triangle, uint(row), draws[corners.w].facing, row_offsets[row]);
+}
