@@ -1,7 +1,7 @@
 """Scenes: glTF and OBJ files, procedural built-ins, and the frozen data they become."""
 
-from .limits import LoadLimits
-from .model import (
+from lfd_render.scene.limits import LoadLimits
+from lfd_render.scene.model import (
     Image,
     Instance,
     Material,

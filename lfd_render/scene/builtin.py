@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from urllib.parse import parse_qsl
 
 from lfd_render.errors import SceneError
-
-from .model import Scene
-from .procedural.chart import chart
-from .procedural.gallery import gallery
-from .procedural.spheres import spheres
+from lfd_render.scene.model import Scene
+from lfd_render.scene.procedural.chart import chart
+from lfd_render.scene.procedural.gallery import gallery
+from lfd_render.scene.procedural.spheres import spheres
 
 PREFIX = "builtin:"
 

@@ -13,19 +13,19 @@ _Choice = TypeVar("_Choice", bound=str)
 _SHOWN = 60  # characters of a wrong value that a message repeats
 
 
-def parse_json(data: bytes, label: str) -> Fields:
+def parse_json(data: bytes) -> Fields:
     """The JSON object in UTF-8 bytes; NaN, Infinity and anything else than an object is refused."""
     try:
-        return Fields(json.loads(data.decode("utf-8-sig"), parse_constant=_refuse_constant), label)
+        return Fields(json.loads(data.decode("utf-8-sig"), parse_constant=_refuse_constant), "")
     except UnicodeDecodeError as error:
         raise SceneError(
-            f"{label}: byte {data[error.start]:#04x} at {error.start} is not UTF-8; "
+            f"JSON: byte {data[error.start]:#04x} at {error.start} is not UTF-8; "
             "save the JSON as UTF-8"
         ) from None
     except RecursionError:
-        raise SceneError(f"{label}: nested too deeply; give plain glTF JSON") from None
+        raise SceneError("JSON: nested too deeply; give plain glTF JSON") from None
     except ValueError as error:
-        raise SceneError(f"{label}: not JSON ({error}); give a valid glTF file") from None
+        raise SceneError(f"JSON: cannot be parsed ({error}); give a valid glTF file") from None
 
 
 def _refuse_constant(name: str) -> NoReturn:
@@ -38,7 +38,7 @@ class Fields:
     def __init__(self, value: Any, path: str) -> None:
         self.path = path
         if not isinstance(value, dict):
-            raise SceneError(f"{path}: {_show(value)}; give a JSON object")
+            raise SceneError(f"{path or 'JSON'}: {_show(value)}; give a JSON object")
         self._values: dict[str, Any] = value
 
     def __contains__(self, key: str) -> bool:

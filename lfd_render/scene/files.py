@@ -8,8 +8,7 @@ from pathlib import Path, PurePosixPath
 from urllib.parse import unquote, unquote_to_bytes
 
 from lfd_render.errors import ResourceError, SceneError
-
-from .limits import LoadLimits
+from lfd_render.scene.limits import LoadLimits
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
 _NEIGHBOURS_ONLY = "give a data URI or a file inside the scene's folder"
@@ -55,14 +54,13 @@ class SceneFiles:
             # Asking first keeps pipes and devices, which may never end, from being opened.
             if path.exists() and not path.is_file():
                 raise SceneError(f"{label}: not a regular file; give a file")
-            with path.open("rb") as stream:
-                data = stream.read(self._limits.file_bytes + 1)
+            self._check_size(path.stat().st_size, label)
+            data = path.read_bytes()
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or str(error)
             raise SceneError(
                 f"{label}: cannot be read ({reason}); give a file that is there and readable"
             ) from None
-        self._check_size(len(data), label)
         return data
 
     def _decode_data(self, uri: str, field: str) -> bytes:

@@ -11,15 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from lfd_render.errors import ResourceError
-
-from .files import SceneFiles
-from .gltf_accessors import Accessors
-from .gltf_document import Document
-from .gltf_materials import Materials
-from .gltf_meshes import Meshes
-from .gltf_nodes import NodeTree
-from .limits import Budget, LoadLimits
-from .model import Instance, Scene
+from lfd_render.scene.files import SceneFiles
+from lfd_render.scene.gltf_accessors import Accessors
+from lfd_render.scene.gltf_document import Document
+from lfd_render.scene.gltf_materials import Materials
+from lfd_render.scene.gltf_meshes import Meshes
+from lfd_render.scene.gltf_nodes import NodeTree
+from lfd_render.scene.limits import Budget, LoadLimits
+from lfd_render.scene.model import Instance, Scene
 
 
 def load_gltf(path: Path, limits: LoadLimits) -> Scene:

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.errors import SceneError
-
-from .fields import Fields
-from .gltf_document import Document
+from lfd_render.scene.fields import Fields
+from lfd_render.scene.gltf_document import Document
 
 _COMPONENTS: dict[int, np.dtype[Any]] = {
     5120: np.dtype("i1"),
@@ -37,10 +36,6 @@ class Accessors:
         self._buffers: dict[int, memoryview] = {}
         self._raw: dict[int, NDArray[Any]] = {}
         self._floats: dict[tuple[int, bool], NDArray[np.float32]] = {}
-
-    def count(self, index: int) -> int:
-        """Elements of an accessor."""
-        return self._document.accessors[index].integer("count", low=1)
 
     def indices(self, index: int) -> NDArray[np.uint32]:
         """A scalar accessor of unsigned integers, [count]."""

@@ -10,10 +10,9 @@ import struct
 from functools import cached_property
 
 from lfd_render.errors import SceneError
-
-from .fields import Fields, parse_json
-from .files import SceneFiles
-from .limits import Budget
+from lfd_render.scene.fields import Fields, parse_json
+from lfd_render.scene.files import SceneFiles
+from lfd_render.scene.limits import Budget
 
 _GLB_MAGIC = b"glTF"
 _CHUNK_JSON, _CHUNK_BIN = 0x4E4F534A, 0x004E4942
@@ -113,9 +112,11 @@ class Document:
 
     def _check_version(self) -> None:
         asset = self.root.child("asset")
-        version = asset.text("minVersion" if "minVersion" in asset else "version")
-        if version != "2.0" and not (version.startswith("2.") and "minVersion" not in asset):
-            asset.fail("version", "convert the file to glTF 2.0")
+        key = "minVersion" if "minVersion" in asset else "version"
+        version = asset.text(key)
+        # A later minor version stays readable unless the file asks for it as its least.
+        if version != "2.0" and not (key == "version" and version.startswith("2.")):
+            asset.fail(key, "convert the file to glTF 2.0")
 
     def _check_extensions(self) -> None:
         for name in self.root.texts("extensionsRequired"):
@@ -134,7 +135,7 @@ class Document:
 def _split(data: bytes) -> tuple[Fields, memoryview | None]:
     """JSON and binary chunk (glTF 2.0, section 4.4); plain JSON has no chunk."""
     if not data.startswith(_GLB_MAGIC):
-        return parse_json(data, ""), None
+        return parse_json(data), None
     if len(data) < 20:
         raise SceneError(f"header: {len(data)} bytes; give a whole GLB file")
     _, version, total = struct.unpack_from("<4sII", data)
@@ -146,7 +147,7 @@ def _split(data: bytes) -> tuple[Fields, memoryview | None]:
     if chunks[0][0] != _CHUNK_JSON:
         raise SceneError(f"chunks[0].type: {chunks[0][0]:#x}; the first chunk must be JSON")
     binary = chunks[1][1] if len(chunks) > 1 and chunks[1][0] == _CHUNK_BIN else None
-    return parse_json(bytes(chunks[0][1]), ""), binary
+    return parse_json(bytes(chunks[0][1])), binary
 
 
 def _chunks(data: memoryview) -> list[tuple[int, memoryview]]:

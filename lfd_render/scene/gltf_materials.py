@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .fields import Fields
-from .gltf_accessors import Accessors
-from .gltf_document import Document
-from .images import ImageRequest, decode_images
-from .model import AlphaMode, Image, Material, TextureSlot, Wrap
+from lfd_render.scene.fields import Fields
+from lfd_render.scene.gltf_accessors import Accessors
+from lfd_render.scene.gltf_document import Document
+from lfd_render.scene.images import ImageRequest, decode_images
+from lfd_render.scene.model import AlphaMode, Image, Material, TextureSlot, Wrap
 
 _WRAPS: dict[int, Wrap] = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 _ALPHA: dict[str, AlphaMode] = {"OPAQUE": "opaque", "MASK": "mask", "BLEND": "blend"}

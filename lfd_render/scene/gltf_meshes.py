@@ -8,16 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.errors import SceneError
-
-from .fields import Fields
-from .gltf_accessors import Accessors
-from .gltf_document import Document
-from .gltf_materials import Materials
-from .gltf_nodes import NodeTree
-from .gltf_skins import joint_matrices
-from .gltf_vertices import Vertices
-from .model import Mesh
-from .normals import face_normals, smooth_normals, unit, without_direction
+from lfd_render.scene.fields import Fields
+from lfd_render.scene.gltf_accessors import Accessors
+from lfd_render.scene.gltf_document import Document
+from lfd_render.scene.gltf_materials import Materials
+from lfd_render.scene.gltf_nodes import NodeTree
+from lfd_render.scene.gltf_skins import joint_matrices
+from lfd_render.scene.gltf_vertices import Vertices
+from lfd_render.scene.model import Mesh
+from lfd_render.scene.normals import face_normals, smooth_normals, unit, without_direction
 
 _MODES = ("points", "lines", "line loop", "line strip", "triangles", "strip", "fan")
 _VERTEX_BYTES, _TRIANGLE_BYTES = 56, 12

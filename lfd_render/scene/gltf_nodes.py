@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.errors import ResourceError, SceneError
-
-from .fields import Fields
-from .gltf_document import Document
-from .model import SceneCamera
+from lfd_render.scene.fields import Fields
+from lfd_render.scene.gltf_document import Document
+from lfd_render.scene.model import SceneCamera
 
 Matrix = NDArray[np.float64]
 
@@ -60,11 +59,14 @@ class NodeTree:
             matrix = local_transform(self._document.nodes[node])
             parent = self._parents[node]
             above = None if parent is None else world[parent]
-            world[node] = matrix if above is None else above @ matrix
+            matrix = matrix if above is None else above @ matrix
+            if not np.isfinite(matrix).all():
+                raise SceneError(f"nodes[{node}]: its world transform overflows; scale it down")
+            world[node] = matrix
             stack.extend(self._children[node])
         done = [w for w in world if w is not None]
         if len(done) < len(world):
-            bad = world.index(None)
+            bad = next(i for i, w in enumerate(world) if w is None)
             raise SceneError(
                 f"nodes[{bad}].children: node {bad} is its own ancestor or descends from such a "
                 "cycle; give the nodes as a tree"
@@ -74,9 +76,10 @@ class NodeTree:
     def _roots(self) -> list[int]:
         """Roots of the file's default scene; of all nodes where it has no scenes."""
         scenes = self._document.root.children("scenes")
+        chosen = self._document.root.index("scene", len(scenes)) or 0
         if not scenes:
             return [i for i, parent in enumerate(self._parents) if parent is None]
-        scene = scenes[self._document.root.index("scene", len(scenes)) or 0]
+        scene = scenes[chosen]
         roots = scene.indices("nodes", len(self._children))
         for root in roots:
             if self._parents[root] is not None:

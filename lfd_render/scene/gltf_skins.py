@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .fields import Fields
-from .gltf_accessors import Accessors
-from .gltf_document import Document
-from .gltf_nodes import NodeTree
-from .normals import unit
+from lfd_render.scene.fields import Fields
+from lfd_render.scene.gltf_accessors import Accessors
+from lfd_render.scene.gltf_document import Document
+from lfd_render.scene.gltf_nodes import NodeTree
+from lfd_render.scene.normals import unit
 
 Vectors = NDArray[np.float32]
 

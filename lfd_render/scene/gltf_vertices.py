@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.errors import SceneError
-
-from .fields import Fields
-from .gltf_accessors import Accessors
-from .gltf_document import Document
-from .gltf_skins import Skinning, morph
+from lfd_render.scene.fields import Fields
+from lfd_render.scene.gltf_accessors import Accessors
+from lfd_render.scene.gltf_document import Document
+from lfd_render.scene.gltf_skins import Skinning, morph
 
 
 class Vertices:
@@ -35,7 +34,9 @@ class Vertices:
         self._used: NDArray[np.int64] | None = None
         if "POSITION" not in self._attributes:
             self._attributes.fail("POSITION", "give vertex positions")
-        self._file_count = accessors.count(self._index(self._attributes, "POSITION"))
+        # Read at once: only a read proves that as many vertices as the count says are there.
+        position = self._index(self._attributes, "POSITION")
+        self._file_count = len(accessors.floats(position, ("VEC3",)))
 
     @property
     def count(self) -> int:

@@ -14,9 +14,8 @@ from PIL import Image as PillowImage
 from PIL import ImageFile, JpegImagePlugin, PngImagePlugin, WebPImagePlugin
 
 from lfd_render.errors import ResourceError, SceneError
-
-from .limits import Budget
-from .model import Image
+from lfd_render.scene.limits import Budget
+from lfd_render.scene.model import Image
 
 
 @dataclass(frozen=True)

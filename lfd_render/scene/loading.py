@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from lfd_render.errors import LfdError, ResourceError, SceneError
+import numpy as np
 
-from .builtin import PREFIX, load_builtin
-from .gltf import load_gltf
-from .limits import LoadLimits
-from .model import Scene
+from lfd_render.errors import LfdError, ResourceError, SceneError
+from lfd_render.scene.builtin import PREFIX, load_builtin
+from lfd_render.scene.gltf import load_gltf
+from lfd_render.scene.limits import LoadLimits
+from lfd_render.scene.model import Scene
 
 _MESSAGE_LIMIT = 500  # characters; names in a file can be of any length
 
@@ -21,11 +22,17 @@ _LOADERS: dict[str, Callable[[Path, LoadLimits], Scene]] = {".gltf": load_gltf, 
 def load_scene(source: str | Path, limits: LoadLimits) -> Scene:
     """Read the scene; the errors' texts start with the source and hold no control characters."""
     try:
-        if isinstance(source, str) and source.startswith(PREFIX):
-            return load_builtin(source)
-        return _load_file(Path(source), limits)
+        # What overflows becomes infinite and is refused, with its field, by the scene's own checks.
+        with np.errstate(all="ignore"):
+            return _load(source, limits)
     except LfdError as error:
         raise type(error)(_one_line(f"{source}: {error}")) from None
+
+
+def _load(source: str | Path, limits: LoadLimits) -> Scene:
+    if isinstance(source, str) and source.startswith(PREFIX):
+        return load_builtin(source)
+    return _load_file(Path(source), limits)
 
 
 def _load_file(path: Path, limits: LoadLimits) -> Scene:
@@ -42,6 +49,9 @@ def _load_file(path: Path, limits: LoadLimits) -> Scene:
 
 
 def _one_line(message: str) -> str:
-    """The message without line breaks or terminal codes, and not endless."""
+    """The message without line breaks or terminal codes; an overlong one loses its middle."""
     clean = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in message)
-    return clean if len(clean) <= _MESSAGE_LIMIT else clean[: _MESSAGE_LIMIT - 1] + "…"
+    if len(clean) <= _MESSAGE_LIMIT:
+        return clean
+    half = _MESSAGE_LIMIT // 2
+    return f"{clean[: half - 1]}…{clean[-half:]}"

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.errors import SceneError
-
-from .limits import LoadLimits
+from lfd_render.scene.limits import LoadLimits
 
 Wrap = Literal["repeat", "clamp", "mirror"]
 AlphaMode = Literal["opaque", "mask", "blend"]
@@ -249,7 +248,7 @@ class Scene:
         Raises SceneError, or ResourceError beyond the limits, in one line that names the
         source, the field, the value and the remedy.
         """
-        from .loading import load_scene  # noqa: PLC0415 (the loaders import this module)
+        from lfd_render.scene.loading import load_scene  # noqa: PLC0415 (the loaders import this module)
 
         return load_scene(source, limits or LoadLimits())
 
@@ -268,12 +267,10 @@ def _freeze(
     if not fits or array.dtype != dtype:
         raise SceneError(f"{label}: {field}: {list(array.shape)} {array.dtype}; give {wanted}")
     # The extremes carry any NaN or infinity and, unlike isfinite, need no array of their own.
-    if issubclass(dtype, np.floating) and array.size and not np.isfinite(array.min() + array.max()):
-        bad = np.flatnonzero(~np.isfinite(array.reshape(len(array), -1)).all(axis=1))
-        if len(bad):
-            raise SceneError(
-                f"{label}: {field}[{bad[0]}]: {array[bad[0]].tolist()}; give finite numbers"
-            )
+    extremes = (array.min(), array.max()) if array.size else ()
+    if issubclass(dtype, np.floating) and not np.isfinite(extremes).all():
+        row = int(np.argmin(np.isfinite(array.reshape(len(array), -1)).all(axis=1)))
+        raise SceneError(f"{label}: {field}[{row}]: {array[row].tolist()}; give finite numbers")
     view = array.view()
     view.setflags(write=False)
     object.__setattr__(owner, field, view)

@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Image, Instance, Material, Scene, TextureSlot
-from .grid import Surface, tessellate
-from .lettering import lettering
-from .shapes import plane
-from .textures import Field, grid, to_pixels
+from lfd_render.scene.model import Image, Instance, Material, Scene, TextureSlot
+from lfd_render.scene.procedural.grid import Surface, tessellate
+from lfd_render.scene.procedural.lettering import lettering
+from lfd_render.scene.procedural.shapes import plane
+from lfd_render.scene.procedural.textures import Field, grid, to_pixels
 
 # x, y, z of the cards' centres; the middle one is the focus card on the window plane.
 CARDS = (

@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Image, Instance, Material, Scene, TextureSlot
-from . import materials as paint
-from .grid import Surface, SurfaceMap, tessellate
-from .shapes import frame, lathe, plane, rounded, sphere, torus_knot
-from .textures import TextureSet, to_pixels
+from lfd_render.scene.model import Image, Instance, Material, Scene, TextureSlot
+from lfd_render.scene.procedural import materials as paint
+from lfd_render.scene.procedural.grid import Surface, SurfaceMap, tessellate
+from lfd_render.scene.procedural.shapes import frame, lathe, plane, rounded, sphere, torus_knot
+from lfd_render.scene.procedural.textures import TextureSet, to_pixels
 
 _HALF_WIDTH, _FLOOR, _CEILING, _BACK, _FRONT = 4.4, -1.65, 2.0, -5.6, 4.4
 _HEIGHT = _CEILING - _FLOOR
@@ -35,7 +35,6 @@ _SETS: dict[str, Callable[[int], TextureSet]] = {
     "bronze": paint.bronze,
     "gilt": paint.gilt,
     "lamp": paint.lamp_glass,
-    "canvas": paint.canvas,
 }
 _PAINTINGS = (
     (5, "35507a", "f0b46a", ("6d7f93", "4c6470", "2f4a48", "1b2f2a")),
@@ -362,28 +361,27 @@ def _add_lamps(hall: _Hall) -> None:
 def _materials(size: int) -> tuple[tuple[Material, ...], tuple[Image, ...]]:
     """Materials in the order of their names, and their pictures, made on two threads."""
     with ThreadPoolExecutor(2) as pool:
-        sets = pool.map(lambda make: make(size).images(), _SETS.values())
-        scenes = pool.map(lambda p: paint.painting(size, *p), _PAINTINGS)
-        images: list[Image] = [image for triple in sets for image in triple]
-        first_painting = len(images)
-        images += [Image(f"painting {i + 1}", to_pixels(p)) for i, p in enumerate(scenes)]
-    materials = [_material(name, 3 * i, 3 * i) for i, name in enumerate(_SETS)]
-    maps = 3 * list(_SETS).index("canvas")
-    materials += [
-        _material(f"painting {i + 1}", first_painting + i, maps) for i in range(len(_PAINTINGS))
-    ]
+        sets = list(pool.map(lambda make: make(size).images(), (*_SETS.values(), paint.canvas)))
+        pictures = list(pool.map(lambda p: to_pixels(paint.painting(size, *p)), _PAINTINGS))
+    images = [image for triple in sets[:-1] for image in triple]
+    materials = [_material(name, 3 * i, 3 * i + 1) for i, name in enumerate(_SETS)]
+    weave = len(images)  # the canvas's own colour is not used
+    images += sets[-1][1:]
+    for name, pixels in zip(_MATERIALS[len(_SETS) :], pictures, strict=True):
+        materials.append(_material(name, len(images), weave))
+        images.append(Image(name, pixels))
     return tuple(materials), tuple(images)
 
 
 def _material(name: str, color: int, maps: int) -> Material:
-    """A material whose colour is image `color` and whose normal and ORM follow image `maps`."""
+    """A material of the images `color`, `maps` (its normals) and the one after (its ORM)."""
     lit = name == "lamp"
     return Material(
         name,
         emissive=(6.0, 5.0, 3.4) if lit else (0.0, 0.0, 0.0),
         base_color_texture=TextureSlot(color),
-        normal_texture=TextureSlot(maps + 1),
-        occlusion_texture=TextureSlot(maps + 2),
-        metallic_roughness_texture=TextureSlot(maps + 2),
+        normal_texture=TextureSlot(maps),
+        occlusion_texture=TextureSlot(maps + 1),
+        metallic_roughness_texture=TextureSlot(maps + 1),
         emissive_texture=TextureSlot(color) if lit else None,
     )

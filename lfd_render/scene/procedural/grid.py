@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Mesh
+from lfd_render.scene.model import Mesh
 
 # Takes u [1, columns] and v [rows, 1], both in 0…1 float32, and returns points that broadcast
 # to [rows, columns] each.

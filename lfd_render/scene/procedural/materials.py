@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .textures import Field, TextureSet, grid, mix, noise, rgb
+from lfd_render.scene.procedural.textures import Field, TextureSet, grid, mix, noise, rgb
 
 _PI = np.float32(np.pi)
 

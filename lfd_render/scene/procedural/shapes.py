@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .grid import SurfaceMap
+from lfd_render.scene.procedural.grid import SurfaceMap
 
 Vector = Sequence[float]
 Relief = Callable[[NDArray[np.float32], NDArray[np.float32]], NDArray[np.float32]]

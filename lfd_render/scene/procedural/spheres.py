@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Image, Instance, Material, Scene, TextureSlot
-from .grid import Surface, tessellate
-from .shapes import plane, sphere
-from .textures import grid, mix, rgb, to_pixels
+from lfd_render.scene.model import Image, Instance, Material, Scene, TextureSlot
+from lfd_render.scene.procedural.grid import Surface, tessellate
+from lfd_render.scene.procedural.shapes import plane, sphere
+from lfd_render.scene.procedural.textures import grid, mix, rgb, to_pixels
 
 # x, z, radius; name, linear base colour, metallic, roughness.
 _FLOOR_Y = -0.86

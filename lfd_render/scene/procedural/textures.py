@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Image
+from lfd_render.scene.model import Image
 
 Field = NDArray[np.float32]  # [y, x], one tile, rows top to bottom
 

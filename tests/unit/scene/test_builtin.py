@@ -1,0 +1,250 @@
+"""The built-in scenes: counts, closed surfaces, orientation, texture maps, framing, options."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lfd_render.errors import SceneError
+from lfd_render.scene import Material, Mesh, Scene
+from lfd_render.scene.procedural.chart import CARDS
+from lfd_render.scene.procedural.textures import noise
+
+NAMES = ("chart", "gallery", "spheres")
+OPEN = {"floor", "ceiling", "ground", "backdrop"}  # besides walls, paintings, cards and rulers
+
+
+def load(name: str, triangles: int) -> Scene:
+    textures = "&textures=32" if name == "gallery" else ""
+    return Scene.load(f"builtin:{name}?triangles={triangles}{textures}")
+
+
+def closed(name: str) -> bool:
+    return name not in OPEN and not any(p in name for p in ("wall", "painting", "card", "ruler"))
+
+
+def edge_balance(mesh: Mesh) -> np.ndarray:
+    """Times each edge is walked forwards minus backwards, by bit-identical positions."""
+    _, vertex = np.unique(mesh.positions, axis=0, return_inverse=True)
+    faces = vertex.reshape(-1)[mesh.triangles].astype(np.int64)
+    starts, ends = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    real = starts != ends
+    starts, ends = starts[real], ends[real]
+    key = np.minimum(starts, ends) * len(mesh.positions) + np.maximum(starts, ends)
+    _, edge = np.unique(key, return_inverse=True)
+    return np.bincount(edge, np.where(starts < ends, 1, -1))
+
+
+def edge_uses(mesh: Mesh) -> np.ndarray:
+    """Triangles at each edge, by bit-identical positions."""
+    _, vertex = np.unique(mesh.positions, axis=0, return_inverse=True)
+    faces = vertex.reshape(-1)[mesh.triangles].astype(np.int64)
+    pairs = np.sort(np.stack((faces, np.roll(faces, -1, axis=1)), axis=-1).reshape(-1, 2), axis=1)
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    return np.unique(pairs, axis=0, return_counts=True)[1]
+
+
+def signed_volume(mesh: Mesh) -> float:
+    a, b, c = (mesh.positions[mesh.triangles[:, i]].astype(np.float64) for i in range(3))
+    return float(np.einsum("mc,mc->", a, np.cross(b, c)) / 6.0)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("triangles", [1_000, 4_321, 100_000])
+def test_the_count_is_reached(name: str, triangles: int) -> None:
+    assert load(name, triangles).triangle_count == pytest.approx(triangles, rel=0.03)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_meshes_are_sound(name: str) -> None:
+    scene = load(name, 30_000)
+    for mesh in scene.meshes:
+        np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-5)
+        spread = np.ptp(mesh.texcoords[:, 0], axis=0)
+        assert (spread >= 0.99).all(), f"{mesh.name}: texture coordinates span {spread}"
+        face = np.cross(
+            mesh.positions[mesh.triangles[:, 1]] - mesh.positions[mesh.triangles[:, 0]],
+            mesh.positions[mesh.triangles[:, 2]] - mesh.positions[mesh.triangles[:, 0]],
+        )
+        agree = np.einsum("mc,mc->m", face, mesh.normals[mesh.triangles].sum(axis=1)) >= 0
+        assert agree.mean() > 0.97, f"{mesh.name}: normals against the winding"
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("triangles", [1_000, 30_000])
+def test_solids_are_watertight_and_face_outwards(name: str, triangles: int) -> None:
+    solids = [m for m in load(name, triangles).meshes if closed(m.name)]
+    assert len(solids) == {"chart": 0, "gallery": 12, "spheres": 9}[name]
+    for mesh in solids:
+        assert (edge_uses(mesh) == 2).all(), mesh.name
+        assert (edge_balance(mesh) == 0).all(), mesh.name
+        assert signed_volume(mesh) > 0, mesh.name
+
+
+def test_the_watertight_check_catches_a_planted_crack_and_a_flip() -> None:
+    good = load("spheres", 1_000).meshes[0]
+    seam = np.flatnonzero(good.texcoords[:, 0, 0] == 1.0)[2]  # neither in a pole's line
+    positions = good.positions.copy()
+    positions[seam] *= np.float32(1 + 1e-6)
+    assert (edge_uses(replace(good, positions=positions)) != 2).any()
+    triangles = good.triangles.copy()
+    triangles[40] = triangles[40, ::-1]
+    assert (edge_balance(replace(good, triangles=triangles)) != 0).any()
+
+
+def test_a_sphere_is_round() -> None:
+    mesh = load("spheres", 100_000).meshes[0]
+    radius = np.linalg.norm(mesh.positions, axis=1)
+    np.testing.assert_allclose(radius, 0.5, rtol=1e-6)
+    np.testing.assert_allclose(mesh.normals, mesh.positions / 0.5, atol=0.02)
+
+
+def slots(material: Material) -> set[str]:
+    return set(material.texture_slots())
+
+
+def test_every_surface_of_the_gallery_has_its_maps() -> None:
+    scene = load("gallery", 1_000)
+    used = {mesh.material for mesh in scene.meshes}
+    assert used == set(range(len(scene.materials)))
+    four = {
+        "base_color_texture",
+        "normal_texture",
+        "metallic_roughness_texture",
+        "occlusion_texture",
+    }
+    for material in scene.materials:
+        assert slots(material) >= four, material.name
+    lamps = [m for m in scene.materials if max(m.emissive) > 1]
+    assert [slots(m) - four for m in lamps] == [{"emissive_texture"}]
+
+
+def test_textures_have_the_asked_size_and_tile() -> None:
+    scene = Scene.load("builtin:gallery?triangles=1000&textures=256")
+    for image in scene.images:
+        assert image.pixels.shape == (256, 256, 4)
+        assert (image.pixels[..., 3] == 255).all()
+        assert np.ptp(image.pixels[..., :3].astype(int), axis=(0, 1)).max() > 0, image.name
+    normals = next(i for i in scene.images if i.name == "plaster normal").pixels[..., :3]
+    vectors = normals / 127.5 - 1.0
+    np.testing.assert_allclose(np.linalg.norm(vectors, axis=-1), 1, atol=0.02)
+    assert vectors[..., 2].min() > 0
+
+
+def test_noise_tiles_and_repeats() -> None:
+    field = noise(64, 5)
+    np.testing.assert_array_equal(field, noise(64, 5))
+    assert abs(field.mean()) < 1e-5
+    inner = np.abs(np.diff(field, axis=1)).mean()
+    seam = np.abs(field[:, 0] - field[:, -1]).mean()
+    assert seam < 2 * inner
+
+
+def test_normal_maps_point_up_the_picture_where_the_surface_does() -> None:
+    """Of a bump, the side toward the picture's top has a normal with +y, as glTF asks."""
+    from lfd_render.scene.procedural.textures import grid, normal_pixels  # noqa: PLC0415
+
+    u, v = grid(64)
+    bump = 0.1 * np.exp(-((u - 0.5) ** 2 + (v - 0.5) ** 2) / 0.02)
+    pixels = normal_pixels(bump.astype(np.float32)).astype(int)
+    assert pixels[20, 32, 1] > 150  # above the middle
+    assert pixels[44, 32, 1] < 105
+    assert pixels[32, 44, 0] > 150  # right of the middle
+    assert pixels[32, 20, 0] < 105
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_texture_v_runs_down_and_u_to_the_right(name: str) -> None:
+    """Seen from the front, no texture is mirrored: ∂p/∂v × ∂p/∂u is the front normal."""
+    for mesh in load(name, 30_000).meshes:
+        corner = mesh.positions[mesh.triangles].astype(np.float64)
+        uv = mesh.texcoords[mesh.triangles][:, :, 0].astype(np.float64)
+        area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        one, two = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+        turned = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+        real = np.linalg.norm(area, axis=1) > 0
+        assert (turned[real] < 0).mean() > 0.99, mesh.name
+
+
+def test_the_gallery_fills_the_window_for_every_eye() -> None:
+    """Each ray from an eye of a 54° cone through the window meets the hall behind the window.
+
+    Walls, floor and ceiling are heights over planes; a ray through the box must leave it.
+    """
+    scene = load("gallery", 100_000)
+    room = {m.name: m for m in scene.meshes if "wall" in m.name or m.name in ("floor", "ceiling")}
+    low = np.array([room["left wall"].positions[:, 0].max(), room["floor"].positions[:, 1].max()])
+    high = np.array(
+        [room["right wall"].positions[:, 0].min(), room["ceiling"].positions[:, 1].min()]
+    )
+    # At the window the room reaches beyond the widest window, so every ray starts inside it …
+    assert scene.default_camera is not None
+    half_height = scene.default_camera["window_height"] / 2
+    assert low[0] < -16 / 9 * half_height
+    assert high[0] > 16 / 9 * half_height
+    assert low[1] < -half_height < half_height < high[1]
+    # … and the six surfaces overlap along their edges, so it cannot leave but through one.
+    back, front = room["back wall"].positions, room["front wall"].positions
+    for part in ("left wall", "right wall", "floor", "ceiling"):
+        depth = room[part].positions[:, 2]
+        assert depth.min() < back[:, 2].max()
+        assert depth.max() > front[:, 2].min()
+    for part in ("left wall", "right wall", "back wall", "front wall"):
+        height = room[part].positions[:, 1]
+        assert height.min() < low[1]
+        assert height.max() > high[1]
+
+
+def test_gallery_content_stands_on_both_sides_of_the_panel() -> None:
+    scene = load("gallery", 10_000)
+    depth = [i.world_from_local[2, 3] for i in scene.instances if "knot" in i.name]
+    assert min(depth) < 0 < max(depth)
+
+
+def test_the_chart_stands_where_it_says() -> None:
+    scene = load("chart", 10_000)
+    assert sorted(z for _, _, z in CARDS)[4] == 0.0
+    by_name = {mesh.name: mesh for mesh in scene.meshes}
+    for x, y, z in CARDS:
+        positions = by_name[f"card {z:+.2f}"].positions
+        np.testing.assert_allclose(positions[:, 2], z, atol=1e-7)
+        np.testing.assert_allclose(positions.mean(axis=0)[:2], (x, y), atol=1e-6)
+    assert all(m.unlit for m in scene.materials)
+    assert scene.default_camera == {
+        "target": [0, 0, 0],
+        "eye_direction": [0, 0, 1],
+        "up": [0, 1, 0],
+        "window_height": 1,
+    }
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        ("builtin:", "builtin: ''; give one of chart, gallery, spheres"),
+        ("builtin:hall", "builtin: 'hall'; give one of chart, gallery, spheres"),
+        ("builtin:spheres?color=1", "option: 'color'; spheres takes triangles"),
+        ("builtin:gallery?n=1", "option: 'n'; gallery takes textures, triangles"),
+        ("builtin:spheres?triangles=999", "triangles: '999'; give a whole number from 1000 to"),
+        ("builtin:spheres?triangles=10000001", "triangles: '10000001'"),
+        ("builtin:spheres?triangles=-1000", "triangles: '-1000'"),
+        ("builtin:spheres?triangles=1e6", "triangles: '1e6'"),
+        ("builtin:spheres?triangles=", "triangles: ''"),
+        ("builtin:spheres?triangles=" + "9" * 5000, "99'; give a whole number from 1000"),
+        ("builtin:spheres?triangles", "options: 'triangles'; write them as name=value"),
+        ("builtin:gallery?textures=8", "textures: '8'; give a whole number from 16 to 4096"),
+    ],
+)
+def test_unknown_builtins_and_options(source: str, expected: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        Scene.load(source)
+    text = str(caught.value)
+    assert expected in text
+    assert text.isprintable()
+    assert ";" in text
+
+
+@pytest.mark.parametrize("textures", [16, 17, 100])
+def test_textures_of_any_size(textures: int) -> None:
+    scene = Scene.load(f"builtin:gallery?triangles=1000&textures={textures}")
+    assert {i.pixels.shape for i in scene.images} == {(textures, textures, 4)}
