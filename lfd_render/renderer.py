@@ -27,12 +27,14 @@ from lfd_render.techniques import Lfdpr, Mvr, Placement, Technique
 REPEAT_TURN_RAD = np.deg2rad(0.5)  # how far the scene turns between repeated frames
 TECHNIQUES = ("lfdpr", "mvr")
 PRESETS = ("default", "paper")
+PROJECTIONS = ("shear", "general")
 
 
 @dataclass(frozen=True)
 class RenderOptions:
     """How to render. view_size: upright views of (width, height); None: views that follow the
-    lenses, with as many rows as makes all views together as large as the panel."""
+    lenses, with as many rows as makes all views together as large as the panel. projection: how
+    points reach the views, by the shear that parallel views share or by each view's own matrix."""
 
     views: int | None = None
     view_size: tuple[int, int] | None = None
@@ -43,6 +45,7 @@ class RenderOptions:
     repeat: int = 1
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)
     exposure: float = 1.0
+    projection: str = "shear"
 
     def __post_init__(self) -> None:
         """Check ranges; raises UsageError."""
@@ -50,6 +53,10 @@ class RenderOptions:
             raise UsageError(f"technique '{self.technique}': unknown; use {' or '.join(TECHNIQUES)}")
         if self.preset not in PRESETS:
             raise UsageError(f"preset '{self.preset}': unknown; use {' or '.join(PRESETS)}")
+        if self.projection not in PROJECTIONS:
+            raise UsageError(
+                f"projection '{self.projection}': unknown; use {' or '.join(PROJECTIONS)}"
+            )
         if self.views is not None and not 1 <= self.views <= 1024:
             raise UsageError(f"views: {self.views} is out of range; use 1 to 1024")
         if self.view_size is not None and not all(1 <= n <= 16384 for n in self.view_size):
@@ -233,7 +240,11 @@ class Renderer:
         if choice.technique == "mvr":
             return Mvr(self.device, buffers, target)
         return Lfdpr(
-            self.device, buffers, target, stochastic_culling=choice.preset == "paper"
+            self.device,
+            buffers,
+            target,
+            stochastic_culling=choice.preset == "paper",
+            general=choice.projection == "general",
         )
 
     def _warm_up(

@@ -63,7 +63,9 @@ class Sample:
         view_lanes: int,
         *,
         stochastic_culling: bool = False,
+        whole_rows: bool = False,
     ) -> None:
+        """whole_rows: keep every row a triangle touches, for views that do not share their rows."""
         self._device = device
         self._scene = scene
         self._view_lanes = view_lanes
@@ -71,7 +73,11 @@ class Sample:
         self._span = Kernel(
             device,
             "sample/span.comp",
-            {"STOCHASTIC_CULLING": int(stochastic_culling), **scene.constants()},
+            {
+                "STOCHASTIC_CULLING": int(stochastic_culling),
+                "WHOLE_ROWS": int(whole_rows),
+                **scene.constants(),
+            },
         )
         self._sum = Kernel(device, "sample/sum.comp", constants)
         self._scan = Kernel(device, "sample/scan.comp", constants)

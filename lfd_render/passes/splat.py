@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
+from lfd_render.display import Rig, ViewGrid
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.layout import CONSTANTS, dtype
 from lfd_render.gpu.memory import Buffer
@@ -45,17 +49,27 @@ class Splat:
     `winners`. The result depends neither on the order of points nor on batches.
     """
 
-    def __init__(self, device: Device, scene: SceneBuffers, view_lanes: int) -> None:
+    def __init__(
+        self, device: Device, scene: SceneBuffers, target: ViewTarget, *, general: bool = False
+    ) -> None:
+        """general: by each view's matrix instead of the shear that parallel views share."""
         constants = {
-            "VIEW_LANES": view_lanes,
+            "VIEW_LANES": view_lanes(target.rig.views),
             "GROUPS_ACROSS": GROUPS_ACROSS,
             **scene.constants(),
         }
         self._scene = scene
+        self._projection: dict[str, Buffer] = {}
+        if general:
+            matrices, shifts = pixel_matrices(target.rig, target.grid)
+            self._projection = {
+                "PixelMatrices": Buffer.of(device, "rig", matrices),
+                "RowShifts": Buffer.of(device, "rig", shifts),
+            }
         self._kernels = {
             (step, alpha_tested): Kernel(
                 device,
-                "splat/shear.comp",
+                "splat/general.comp" if general else "splat/shear.comp",
                 {**constants, "STEP": step, "ALPHA_TESTED": int(alpha_tested)},
             )
             for alpha_tested in sorted({batch.alpha_tested for batch in scene.batches})
@@ -107,6 +121,7 @@ class Splat:
                 "PointRows": points.rows,
                 "WorkBlock": points.work,
                 "Eyes": target.eyes,
+                **self._projection,
                 "Depths": views.depths,
                 "Words": views.words,
             },
@@ -117,5 +132,28 @@ class Splat:
 
     def release(self) -> None:
         """Free the kernels."""
-        for kernel in self._kernels.values():
-            kernel.release()
+        for owner in (*self._kernels.values(), *self._projection.values()):
+            owner.release()
+
+
+def pixel_matrices(
+    rig: Rig, grid: ViewGrid
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Each view's display space → (column·w, row·w, 0, w), and how columns are shifted by row.
+
+    Returns float32 [view, 16] as GLSL lays a mat4 out, and int32 [row]: a matrix's column less the
+    stored one, which steps with the lenses where the view follows them.
+    """
+    shifts = (grid.row_base - grid.row_base[0]).astype(np.int32)
+    offsets = grid.row_offset + shifts
+    slope = float(offsets[-1] - offsets[0]) / max(grid.rows - 1, 1)
+    start = float(offsets[0]) - 0.5 * slope
+    width, height = rig.panel_mm
+    pixel_from_clip = np.zeros((4, 4))
+    pixel_from_clip[3, 3] = 1.0
+    pixel_from_clip[1, [1, 3]] = -0.5 * grid.rows, 0.5 * grid.rows  # rows run downward
+    window_columns = width / grid.column_mm
+    pixel_from_clip[0, [0, 3]] = 0.5 * window_columns, start
+    pixel_from_clip[0] += slope * pixel_from_clip[1]
+    matrices = pixel_from_clip @ rig.matrices()
+    return matrices.transpose(0, 2, 1).reshape(-1, 16).astype(np.float32), shifts

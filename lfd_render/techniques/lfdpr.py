@@ -23,13 +23,17 @@ class Lfdpr:
         target: ViewTarget,
         *,
         stochastic_culling: bool = False,
+        general: bool = False,
     ) -> None:
+        """general: splat by each view's matrix instead of the shear that parallel views share."""
         lanes = view_lanes(target.rig.views)
         self.target = target
         self._scene = scene
         self._transform = Transform(device)
-        self._sample = Sample(device, scene, lanes, stochastic_culling=stochastic_culling)
-        self._splat = Splat(device, scene, lanes)
+        self._sample = Sample(
+            device, scene, lanes, stochastic_culling=stochastic_culling, whole_rows=general
+        )
+        self._splat = Splat(device, scene, target, general=general)
         self._shade = Shade(device, scene, target)
         self._points = [self._sample.allocate(batch) for batch in scene.batches]
         self._views = ViewBuffers(device, target)

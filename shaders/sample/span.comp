@@ -75,10 +75,13 @@ void main() {
     extend_by_edge(rows, c, a);
     if (rows.x > rows.y) return;
 
-    int first = max(frame.band_first, row_index(ceil(rows.x - 0.5 - ROUNDING_ROWS)));
-    int last = min(frame.band_first + frame.band_rows - 1, row_index(floor(rows.y - 0.5 + ROUNDING_ROWS)));
-    while (first <= last && !crosses(a, b, c, first)) first++;
-    while (first <= last && !crosses(a, b, c, last)) last--;
+    // Views that share their rows need those whose centre is inside; others all that are touched.
+    int first = max(frame.band_first, row_index(WHOLE_ROWS == 0 ? ceil(rows.x - 0.5 - ROUNDING_ROWS) : floor(rows.x - ROUNDING_ROWS)));
+    int last = min(frame.band_first + frame.band_rows - 1, row_index(WHOLE_ROWS == 0 ? floor(rows.y - 0.5 + ROUNDING_ROWS) : floor(rows.y + ROUNDING_ROWS)));
+    if (WHOLE_ROWS == 0) {
+        while (first <= last && !crosses(a, b, c, first)) first++;
+        while (first <= last && !crosses(a, b, c, last)) last--;
+    }
     if (first > last) return;
 
     // Columns: outside the window in every view. Only where nothing is cut by the near plane.
