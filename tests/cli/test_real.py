@@ -1,6 +1,7 @@
 """The commands with the real renderer, each in a process of its own as a person runs it."""
 
 import json
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -53,3 +54,18 @@ def test_views_differ_by_parallax(scene: Path, display: Path, tmp_path: Path) ->
     )
     assert first.shape == last.shape == (*found["view_size"][::-1], 3)
     assert np.abs(first - last).max() > 50
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupted_render_leaves_nothing(
+    number: signal.Signals, code: int, scene: Path, tmp_path: Path
+) -> None:
+    command = [sys.executable, "-m", "lfd_render.cli.main", "render", str(scene)]
+    command += ["-o", str(tmp_path / "eia.png"), "--views", "2", "--repeat", "1000000"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        assert "warning: display" in process.stderr.readline()
+        process.send_signal(number)
+        assert process.wait(timeout=60) == code
+        assert process.stderr.read() in ("", "lfd-render: error: interrupted\n")
+    assert list(tmp_path.iterdir()) == []
