@@ -168,4 +168,4 @@ def _backdrop_pixels() -> NDArray[np.uint8]:
 def _grey(paper: Field) -> NDArray[np.uint8]:
     """0 ink to 1 paper as sRGB pixels."""
     value = _INK + (_PAPER - _INK) * paper
-    return to_pixels(np.repeat(value[..., None], 3, axis=-1))
+    return to_pixels((value, value, value))

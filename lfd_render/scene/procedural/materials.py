@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lfd_render.scene.procedural.textures import Field, TextureSet, grid, mix, noise, rgb
+from lfd_render.scene.procedural.textures import Field, TextureSet, grid, mix, noise, rgb, ridge
 
 _PI = np.float32(np.pi)
 
@@ -38,7 +38,7 @@ def damask(size: int) -> TextureSet:
     thread = np.sin(2 * _PI * 160 * v) * np.float32(0.5) + np.sin(2 * _PI * 160 * u) * 0.5
     worn = noise(size, 21, 1.4)
     color = mix(rgb("6b1521"), rgb("93373a"), 0.85 * ornament + 0.07 * worn)
-    color *= (1.0 + 0.04 * thread + 0.02 * worn)[..., None]
+    color *= 1.0 + 0.04 * thread + 0.02 * worn
     height = (0.0009 * ornament + 0.00015 * thread + 0.00005 * worn).astype(np.float32)
     roughness = (0.85 - 0.28 * ornament + 0.03 * worn).astype(np.float32)
     return TextureSet("damask", color, height, roughness)
@@ -104,7 +104,7 @@ def canvas(size: int) -> TextureSet:
     weave = np.sin(2 * _PI * 192 * u) * np.sin(2 * _PI * 192 * v)
     strokes = noise(size, 81, 1.0, 8.0)
     height = (0.0002 * weave + 0.0003 * strokes).astype(np.float32)
-    color = np.broadcast_to(rgb("d8cdb8"), (size, size, 3))
+    color = np.broadcast_to(rgb("d8cdb8"), (3, size, size))
     return TextureSet("canvas", color, height, 0.42 + 0.05 * strokes)
 
 
@@ -118,7 +118,7 @@ def lamp_glass(size: int) -> TextureSet:
 
 
 def painting(size: int, seed: int, sky: str, sun: str, hills: tuple[str, ...]) -> Field:
-    """A landscape, [y, x, 3] sRGB: sky, sun and ranges of hills that fade with distance."""
+    """A landscape, [rgb, y, x] in sRGB: sky, sun and ranges of hills that fade with distance."""
     u, v = grid(size)
     clouds = noise(size, seed, 1.7)
     color = mix(rgb(sky), rgb(sun), 1.3 * v - 0.2 + 0.12 * clouds)
@@ -126,11 +126,13 @@ def painting(size: int, seed: int, sky: str, sun: str, hills: tuple[str, ...]) -
     color = mix(color, rgb("fff6dc"), (0.075 - disc) * 60)
     color = mix(color, rgb(sun), 0.6 * np.exp(-((disc / np.float32(0.22)) ** 2)))
     for i, code in enumerate(hills):
-        ridge = noise(size, seed + 100 + i, 1.5)[:1] * np.float32(0.045 * (1 + 0.4 * i))
-        line = np.float32(0.48 + 0.5 * i / len(hills)) + ridge
-        inside = ((v - line) * 90).astype(np.float32)
-        shade = 1.0 + 0.10 * np.roll(clouds, 37 * (i + 1), axis=0) - 0.5 * np.clip(v - line, 0, 1)
-        color = mix(color, (rgb(code) * shade[..., None]).astype(np.float32), inside)
+        crest = ridge(size, seed + i) * np.float32(0.05 * (1 + 0.3 * i))
+        line = crest + np.float32(0.48 + 0.5 * i / len(hills))
+        below = slice(max(int(line.min() * size) - 1, 0), None)  # rows that the hills reach
+        depth = v[below] - line
+        shade = 1.0 + 0.1 * clouds[: size - below.start] - 0.5 * np.maximum(depth, 0.0)
+        hill: Field = (rgb(code) * shade).astype(np.float32)
+        color[:, below] = mix(color[:, below], hill, depth * 90)
     return color
 
 

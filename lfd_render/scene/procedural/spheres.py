@@ -106,22 +106,14 @@ def _gradient() -> Image:
 
 
 def _checker() -> Image:
-    """Two by two warm grey fields, sRGB, with a hairline joint between them."""
-    size = 512
-    y, x = np.mgrid[0:size, 0:size]
-    half = size // 2
-    light = ((x // half) + (y // half)) % 2
-    joint = (
-        np.minimum(
-            np.minimum(x % half, half - 1 - x % half), np.minimum(y % half, half - 1 - y % half)
-        )
-        < 3
-    )
-    grey = np.where(light == 1, 214, 96).astype(np.float64)
-    grey[joint] = 60
-    pixels = np.full((size, size, 4), 255, np.uint8)
-    pixels[..., :3] = (grey[..., None] * np.array([1.0, 0.985, 0.955])).astype(np.uint8)
-    return Image("ground checker", pixels)
+    """Two by two fields of light and dark warm grey, sRGB, with a joint between them."""
+    u, v = grid(512)
+    across, down = 2 * u, 2 * v
+    light = ((across.astype(np.int32) + down.astype(np.int32)) % 2).astype(np.float32)
+    edge = np.minimum(np.minimum(across % 1, 1 - across % 1), np.minimum(down % 1, 1 - down % 1))
+    joint = ((np.float32(0.016) - edge) * 256).astype(np.float32)
+    color = mix(mix(rgb("605f5c"), rgb("d6d3cc"), light), rgb("3c3b39"), joint)
+    return Image("ground checker", to_pixels(color))
 
 
 def _translation(offset: tuple[float, float, float]) -> NDArray[np.float64]:

@@ -5,6 +5,7 @@ All noise is spectral, so every texture tiles; seeds are fixed, so every run giv
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -20,8 +21,8 @@ Field = NDArray[np.float32]  # [y, x], one tile, rows top to bottom
 class TextureSet:
     """What a surface looks like over one tile, before it is packed into pictures.
 
-    `color` is [y, x, 3] sRGB in 0…1; `height` is in tile widths (it gives normals and occlusion);
-    roughness and metallic are fields or numbers in 0…1.
+    `color` is [rgb, y, x] in sRGB, 0…1; `height` is in tile widths and gives normals and
+    occlusion; roughness and metallic are fields or numbers in 0…1.
     """
 
     name: str
@@ -39,20 +40,17 @@ class TextureSet:
         )
 
     def _orm(self) -> NDArray[np.uint8]:
-        size = len(self.height)
-        packed = np.empty((size, size, 3), np.float32)
         # Hollows see less of the sky: depth below the smoothed surface, in 1/60 of a tile.
-        packed[..., 0] = 1.0 + 60.0 * np.minimum(self.height - _smooth(self.height), 0.0)
-        packed[..., 1] = self.roughness
-        packed[..., 2] = self.metallic
-        return to_pixels(packed)
+        occlusion = 1.0 + 60.0 * np.minimum(self.height - _smooth(self.height), 0.0)
+        return to_pixels((occlusion, self.roughness, self.metallic))
 
 
-def to_pixels(color: Field) -> NDArray[np.uint8]:
-    """[y, x, 3] in 0…1 as opaque [y, x, 4] bytes, rounded."""
-    pixels = np.empty((*color.shape[:2], 4), np.uint8)
-    pixels[..., :3] = np.clip(color, 0.0, 1.0) * np.float32(255.0) + np.float32(0.5)
-    pixels[..., 3] = 255
+def to_pixels(channels: Field | Sequence[NDArray[np.floating] | float]) -> NDArray[np.uint8]:
+    """Three channels in 0…1, each [y, x] or a number, as opaque [y, x, 4] bytes, rounded."""
+    red, green, blue = np.broadcast_arrays(*channels)
+    pixels = np.full((*red.shape, 4), 255, np.uint8)
+    for i, channel in enumerate((red, green, blue)):
+        pixels[..., i] = np.clip(channel, 0.0, 1.0) * np.float32(255.0) + np.float32(0.5)
     return pixels
 
 
@@ -61,9 +59,8 @@ def normal_pixels(height: Field) -> NDArray[np.uint8]:
     size = np.float32(len(height))
     slope_x = (np.roll(height, -1, axis=1) - np.roll(height, 1, axis=1)) * (size / 2)
     slope_y = (np.roll(height, 1, axis=0) - np.roll(height, -1, axis=0)) * (size / 2)
-    length = np.sqrt(slope_x**2 + slope_y**2 + 1.0)
-    normal = np.stack((-slope_x, -slope_y, np.ones_like(height)), axis=-1) / length[..., None]
-    return to_pixels((normal * 0.5 + 0.5).astype(np.float32))
+    half: Field = np.float32(0.5) / np.sqrt(slope_x**2 + slope_y**2 + np.float32(1.0))
+    return to_pixels((0.5 - slope_x * half, 0.5 - slope_y * half, 0.5 + half))
 
 
 @lru_cache(maxsize=8)
@@ -97,6 +94,19 @@ def noise(size: int, seed: int, falloff: float = 1.6, lowest: float = 1.0) -> Fi
     return field
 
 
+def ridge(size: int, seed: int, falloff: float = 1.0) -> Field:
+    """A tiling skyline, [1, size], of mean 0 and deviation 1: amplitude ∝ frequency^−falloff."""
+    generator = np.random.default_rng(seed)
+    frequency = np.arange(size // 2 + 1, dtype=np.float32)
+    phase = generator.random(len(frequency), np.float32) * np.float32(2.0 * np.pi)
+    frequency[0] = 1.0
+    spectrum = frequency ** np.float32(-falloff - 0.5) * np.exp(1j * phase)
+    spectrum[0] = 0.0
+    line: Field = np.fft.irfft(spectrum, size).astype(np.float32)[None, :]
+    line /= line.std()
+    return line
+
+
 def _smooth(field: Field, cutoff: float = 24.0) -> Field:
     """The field without detail finer than `cutoff` cycles a tile."""
     size = len(field)
@@ -112,13 +122,18 @@ def grid(size: int) -> tuple[Field, Field]:
     return line[None, :], line[:, None]
 
 
-def mix(first: NDArray[np.float32], second: NDArray[np.float32], share: Field) -> Field:
-    """Colours or fields blended: 0 gives the first, 1 the second; colours are [3] or [y, x, 3]."""
-    weight = np.clip(share, 0.0, 1.0)[..., None]
-    mixed: Field = (first * (1.0 - weight) + second * weight).astype(np.float32)
+def mix(first: Field, second: Field, share: Field) -> Field:
+    """Fields or colours blended: 0 gives the first, 1 the second.
+
+    Colours are [rgb, y, x] or [rgb, 1, 1], the share [y, x] and clipped to 0…1. Colours are planar
+    because numpy broadcasts along a last axis of 3 several times slower.
+    """
+    mixed: Field = (second - first) * np.clip(share, np.float32(0.0), np.float32(1.0))
+    mixed += first
     return mixed
 
 
-def rgb(code: str) -> NDArray[np.float32]:
-    """An sRGB colour from six hexadecimal digits, [3] in 0…1."""
-    return np.frombuffer(bytes.fromhex(code), np.uint8).astype(np.float32) / np.float32(255.0)
+def rgb(code: str) -> Field:
+    """An sRGB colour from six hexadecimal digits, [rgb, 1, 1] in 0…1."""
+    levels = np.frombuffer(bytes.fromhex(code), np.uint8).astype(np.float32)
+    return (levels / np.float32(255.0)).reshape(3, 1, 1)
