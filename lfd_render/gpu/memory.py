@@ -143,11 +143,10 @@ class TextureArray:
         """Make the texture what samplers of this unit read."""
         self._device.raw.glBindTextureUnit(unit, self.name)
 
-    def bind_image(self, unit: int) -> None:
-        """Make all layers what image stores of this unit write."""
-        self._device.raw.glBindImageTexture(
-            unit, self.name, 0, 1, 0, gl.WRITE_ONLY, self.internal_format
-        )
+    def bind_image(self, unit: int, *, writeonly: bool = True) -> None:
+        """Make all layers what image stores, and loads unless writeonly, of this unit reach."""
+        access = gl.WRITE_ONLY if writeonly else gl.READ_WRITE
+        self._device.raw.glBindImageTexture(unit, self.name, 0, 1, 0, access, self.internal_format)
 
     def read(self, dtype: DTypeLike, gl_type: int) -> NDArray[Any]:
         """Level 0 as [layer, y, x, 4]. Waits for the device."""

@@ -23,6 +23,11 @@ LINEAR = 0x2601
 LINEAR_MIPMAP_LINEAR = 0x2703
 WRAPS = {"repeat": 0x2901, "clamp": 0x812F, "mirror": 0x8370}
 WRITE_ONLY = 0x88B9
+READ_WRITE = 0x88BA
+EQUAL = 0x0202
+BLEND = 0x0BE2
+SRC_ALPHA = 0x0302
+ONE_MINUS_SRC_ALPHA = 0x0303
 COLOR_ATTACHMENT0 = 0x8CE0
 DEPTH_ATTACHMENT = 0x8D00
 DEPTH_COMPONENT32F = 0x8CAC
@@ -91,6 +96,8 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "glFrontFace": (None, (_u,)),
     "glCullFace": (None, (_u,)),
     "glDepthFunc": (None, (_u,)),
+    "glColorMask": (None, (ctypes.c_ubyte,) * 4),
+    "glBlendFunc": (None, (_u, _u)),
 }
 
 

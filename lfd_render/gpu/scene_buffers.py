@@ -1,6 +1,6 @@
 """A scene on the device: batches of triangles, draws, materials and textures.
 
-A batch holds triangles of one kind (opaque, or tested for alpha) of as many draws as fit the limits;
+A batch holds triangles of one alpha mode, of as many draws as fit the limits;
 ids of triangles run through the batches. What depends on the camera, the draws' matrices, is written
 each frame; everything else is uploaded once.
 """
@@ -18,6 +18,7 @@ from lfd_render.gpu.layout import CONSTANTS, TEXTURE_ROLES, dtype
 from lfd_render.gpu.memory import Buffer, TextureArray
 from lfd_render.gpu.textures import MaterialTextures
 from lfd_render.scene import Material, Mesh, Scene
+from lfd_render.scene.model import ALPHA_MODES, AlphaMode
 
 if TYPE_CHECKING:
     from lfd_render.gpu.device import Device
@@ -63,12 +64,12 @@ class Batch:
     """Buffers of one batch. `triangle_base` is the id of its first triangle."""
 
     def __init__(
-        self, device: Device, parts: list[_Part], triangle_base: int, *, alpha_tested: bool
+        self, device: Device, parts: list[_Part], triangle_base: int, alpha_mode: AlphaMode
     ) -> None:
         vertex_counts = [len(part.positions) for part in parts]
         starts = np.concatenate(([0], np.cumsum(vertex_counts)[:-1]))
         self.triangle_base = triangle_base
-        self.alpha_tested = alpha_tested
+        self.alpha_mode = alpha_mode
         self.vertices = int(sum(vertex_counts))
         self.triangles = sum(len(part.triangles) for part in parts)
         self.draws = [(part.draw, len(part.triangles)) for part in parts]
@@ -139,9 +140,9 @@ class SceneBuffers:
         self._extras = any(_needs_extras(mesh) for mesh in scene.meshes)
         self.batches: list[Batch] = []
         base = 0
-        for alpha_tested in (False, True):
-            for parts in _batches(scene, alpha_tested=alpha_tested, extras=self._extras):
-                batch = Batch(device, parts, base, alpha_tested=alpha_tested)
+        for alpha_mode in ALPHA_MODES:
+            for parts in _batches(scene, alpha_mode, extras=self._extras):
+                batch = Batch(device, parts, base, alpha_mode)
                 self.batches.append(batch)
                 base += batch.triangles
         self.triangles = base
@@ -240,14 +241,14 @@ def _shares_occlusion(material: Material) -> bool:
     )
 
 
-def _batches(scene: Scene, *, alpha_tested: bool, extras: bool) -> Iterator[list[_Part]]:
-    """Parts of all draws of one kind, in lists that fit a batch."""
+def _batches(scene: Scene, alpha_mode: AlphaMode, *, extras: bool) -> Iterator[list[_Part]]:
+    """Parts of all draws of one alpha mode, in lists that fit a batch."""
     parts: list[_Part] = []
     triangles = vertices = 0
     attributes: dict[int, _Attributes] = {}
     for draw, instance in enumerate(scene.instances):
         mesh = scene.meshes[instance.mesh]
-        if (scene.materials[mesh.material].alpha_mode != "opaque") != alpha_tested:
+        if scene.materials[mesh.material].alpha_mode != alpha_mode:
             continue
         if instance.mesh not in attributes:
             attributes[instance.mesh] = _attributes(mesh, extras=extras)

@@ -10,10 +10,12 @@ from lfd_render.gpu import raw as gl
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.framebuffer import IndexedDraws, LayerTarget
 from lfd_render.gpu.memory import Buffer
-from lfd_render.gpu.programs import RasterProgram
+from lfd_render.gpu.programs import RasterProgram, Uniform
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.shade import gl_matrix
 from lfd_render.passes.view_target import Band, ViewTarget
+
+_Camera = dict[str, Uniform]
 
 
 class RasterForward:
@@ -25,20 +27,24 @@ class RasterForward:
         self._target = target
         self._layer = LayerTarget(device, target.images, depth=True)
         self._programs = {
-            alpha_tested: RasterProgram(
+            alpha_mode: RasterProgram(
                 device,
                 "raster/forward.vert",
                 "raster/forward.frag",
-                {"ALPHA_TESTED": int(alpha_tested), **scene.constants()},
+                {
+                    "ALPHA_TESTED": int(alpha_mode == "mask"),
+                    "BLENDED": int(alpha_mode == "blend"),
+                    **scene.constants(),
+                },
             )
-            for alpha_tested in sorted({batch.alpha_tested for batch in scene.batches})
+            for alpha_mode in sorted({batch.alpha_mode for batch in scene.batches})
         }
         self._indices: list[Buffer] = []
         self._draws: list[IndexedDraws] = []
         for batch in scene.batches:
             corners = batch.corners.read(np.uint32).reshape(-1, 4)[:, :3]
             self._indices.append(Buffer.of(device, "indices", corners))
-            program = self._programs[batch.alpha_tested]
+            program = self._programs[batch.alpha_mode]
             self._draws.append(IndexedDraws(device, program, self._indices[-1]))
 
     def __call__(
@@ -61,31 +67,46 @@ class RasterForward:
         raw.glEnable(gl.CLIP_DISTANCE0)
         raw.glEnable(gl.CLIP_DISTANCE0 + 1)
         raw.glCullFace(gl.BACK)
-        for batch, draws in zip(self._scene.batches, self._draws, strict=True):
-            self._draw_batch(
-                batch,
-                draws,
-                band,
-                {
-                    "clip_from_display": gl_matrix(clip),
-                    "world_from_display": gl_matrix(world_from_display),
-                    "eye_mm": eye_mm,
-                    "eye_world": tuple(eye_world[:3]),
-                },
-                view,
-            )
+        camera: _Camera = {
+            "clip_from_display": gl_matrix(clip),
+            "world_from_display": gl_matrix(world_from_display),
+            "eye_mm": eye_mm,
+            "eye_world": tuple(eye_world[:3]),
+        }
+        batches = list(zip(self._scene.batches, self._draws, strict=True))
+        for batch, draws in batches:
+            if batch.alpha_mode != "blend":
+                self._draw_batch(batch, draws, band, camera)
+        blended = [pair for pair in batches if pair[0].alpha_mode == "blend"]
+        if blended:
+            self._blend_nearest(blended, band, camera)
         raw.glDisable(gl.CLIP_DISTANCE0)
         raw.glDisable(gl.CLIP_DISTANCE0 + 1)
         raw.glDisable(gl.CULL_FACE)
         raw.glDisable(gl.DEPTH_TEST)
+
+    def _blend_nearest(
+        self, blended: list[tuple[Batch, IndexedDraws]], band: Band, camera: _Camera
+    ) -> None:
+        """Lay the nearest blended surface over what is drawn: depth first, then colour at it."""
+        raw = self._device.raw
+        raw.glColorMask(0, 0, 0, 0)
+        for batch, draws in blended:
+            self._draw_batch(batch, draws, band, camera)
+        raw.glColorMask(1, 1, 1, 1)
+        raw.glDepthFunc(gl.EQUAL)
+        raw.glEnable(gl.BLEND)
+        raw.glBlendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA)
+        for batch, draws in blended:
+            self._draw_batch(batch, draws, band, camera)
+        raw.glDisable(gl.BLEND)
 
     def _draw_batch(
         self,
         batch: Batch,
         draws: IndexedDraws,
         band: Band,
-        camera: dict[str, bytes | float | tuple[float, ...]],
-        view: int,
+        camera: _Camera,
     ) -> None:
         """Draw a batch's runs: sides culled as each run's materials and placements ask."""
         raw = self._device.raw
@@ -98,10 +119,9 @@ class RasterForward:
             **self._scene.materials_of(),
         }
         samplers = self._scene.samplers()
-        per_view = {"view": view} if batch.alpha_tested else {}
         for run in self._scene.runs(batch):
-            self._programs[batch.alpha_tested].set(
-                buffers, {**camera, **per_view}, samplers
+            self._programs[batch.alpha_mode].set(
+                buffers, camera, samplers
             )
             (raw.glDisable if run.double_sided else raw.glEnable)(gl.CULL_FACE)
             # Row 0 at the raster's bottom turns windings over.

@@ -34,6 +34,10 @@ class ViewBuffers:
     def clear(self) -> None:
         """Set all pixels to nothing, infinitely far."""
         self.depths.fill(_FARTHEST)
+        self.clear_words()
+
+    def clear_words(self) -> None:
+        """Forget the winners and keep the depths, for surfaces that lie over what was drawn."""
         self.words.fill(CONSTANTS["NO_TRIANGLE"])
 
     def release(self) -> None:
@@ -67,12 +71,12 @@ class Splat:
                 "RowShifts": Buffer.of(device, "rig", shifts),
             }
         self._kernels = {
-            (step, alpha_tested): Kernel(
+            (step, masked): Kernel(
                 device,
                 "splat/general.comp" if general else "splat/shear.comp",
-                {**constants, "STEP": step, "ALPHA_TESTED": int(alpha_tested)},
+                {**constants, "STEP": step, "ALPHA_TESTED": int(masked)},
             )
-            for alpha_tested in sorted({batch.alpha_tested for batch in scene.batches})
+            for masked in sorted({batch.alpha_mode == "mask" for batch in scene.batches})
             for step in (_DEPTH, _WINNER)
         }
 
@@ -110,7 +114,7 @@ class Splat:
         band: Band,
         views: ViewBuffers,
     ) -> None:
-        kernel = self._kernels[step, batch.alpha_tested]
+        kernel = self._kernels[step, batch.alpha_mode == "mask"]
         kernel.set(
             {
                 **batch.geometry(),

@@ -14,7 +14,10 @@ from lfd_render.techniques.base import Placement
 
 
 class Lfdpr:
-    """transform → sample → splat (depths, winners) → shade."""
+    """transform → sample → splat (depths, winners) → shade.
+
+    Blended materials show their nearest layer, splatted and shaded over the solid ones.
+    """
 
     def __init__(
         self,
@@ -60,22 +63,40 @@ class Lfdpr:
             for batch, points in self._batches():
                 self._sample(batch, self.target, band, points)
                 self._sample.rows(batch, self.target, band, points, 0)
+        placement = self._placement
+        solid = [pair for pair in self._batches() if pair[0].alpha_mode != "blend"]
         with clock.stage("splat"):
             self._views.clear()
-            for splat in (self._splat.depths, self._splat.winners):
-                for batch, points in self._batches():
-                    for window in range(points.windows):
-                        if points.windows > 1:
-                            self._sample.rows(batch, self.target, band, points, window)
-                        splat(batch, points, window, self.target, band, self._views)
+            self._find_winners(solid, band)
         with clock.stage("shade"):
-            self._shade(
+            self._shade.opaque(
                 self.target,
                 band,
                 self._views,
-                self._placement.world_from_display,
-                self._placement.background,
+                [batch for batch, _ in solid],
+                placement.world_from_display,
+                placement.background,
             )
+        blended = [pair for pair in self._batches() if pair[0].alpha_mode == "blend"]
+        if blended:
+            with clock.stage("blend"):
+                self._views.clear_words()
+                self._find_winners(blended, band)
+                self._shade.blend(
+                    self.target,
+                    band,
+                    self._views,
+                    [batch for batch, _ in blended],
+                    placement.world_from_display,
+                )
+
+    def _find_winners(self, batches: list[tuple[Batch, PointCloud]], band: Band) -> None:
+        for splat in (self._splat.depths, self._splat.winners):
+            for batch, points in batches:
+                for window in range(points.windows):
+                    if points.windows > 1:
+                        self._sample.rows(batch, self.target, band, points, window)
+                    splat(batch, points, window, self.target, band, self._views)
 
     def complete(self) -> bool:
         """Whether the windows held all points since the last call; if not, they do from now on."""

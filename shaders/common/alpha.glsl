@@ -1,11 +1,10 @@
-// Whether a triangle's material is opaque at a view pixel.
+// Whether a masked triangle's alpha reaches its cutoff at a view pixel.
 
 #include "common/surface.glsl"
 #include "common/textures.glsl"
 #include "common/vertices.glsl"
-#include "common/coverage.glsl"
 
-bool alpha_accepts(uint triangle, Plane plane, float eye_mm, float x_mm, float y_mm, ivec3 pixel) {
+bool alpha_accepts(uint triangle, Plane plane, float eye_mm, float x_mm, float y_mm) {
     uvec4 corners = triangles[triangle];
     vec3 a = display_positions[corners.x].xyz;
     vec3 b = display_positions[corners.y].xyz;
@@ -23,5 +22,5 @@ bool alpha_accepts(uint triangle, Plane plane, float eye_mm, float x_mm, float y
         Footprint f1 = Footprint(uv1 * hit.weights, uv1 * hit.weights_dx, uv1 * hit.weights_dy);
         alpha *= sample_srgb(slot, slot_footprint(material, BASE_COLOR, f0, f1)).a;
     }
-    return alpha_accepts_value(alpha, material, pixel);
+    return alpha >= alpha_cutoff(material);
 }

@@ -18,3 +18,7 @@ uint slot_of(uint material, uint role) {
     if ((ROLES >> role & 1u) == 0u) return NO_TEXTURE;
     return texture_slots[material * TEXTURE_ROLES + role];
 }
+
+float alpha_cutoff(uint material) {
+    return unpackHalf2x16(materials[material].emissive_b_cutoff).y;
+}

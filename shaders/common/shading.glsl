@@ -88,9 +88,11 @@ vec3 emitted(Surface surface) {
     return radiance;
 }
 
-vec3 shade(Surface surface, vec3 eye_world) {
-    vec3 base_color = base_color_of(surface).rgb;
-    if ((materials[surface.material].flags & UNLIT) != 0u) return base_color;
+// Radiance towards the eye and opacity.
+vec4 shade(Surface surface, vec3 eye_world) {
+    vec4 base_color_alpha = base_color_of(surface);
+    vec3 base_color = base_color_alpha.rgb;
+    if ((materials[surface.material].flags & UNLIT) != 0u) return base_color_alpha;
     vec3 orm = occlusion_roughness_metallic(surface);
     float roughness = orm.g, metallic = orm.b;
 
@@ -115,5 +117,5 @@ vec3 shade(Surface surface, vec3 eye_world) {
         vec3 specular = specular_brdf(f0, alpha, n_dot_l, n_dot_v, clamp(dot(normal, halfway), 0.0, 1.0), clamp(dot(view, halfway), 0.0, 1.0));
         radiance += KEY_IRRADIANCE * n_dot_l * (albedo / PI + specular);
     }
-    return radiance + emitted(surface);
+    return vec4(radiance + emitted(surface), base_color_alpha.a);
 }

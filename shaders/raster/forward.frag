@@ -3,7 +3,6 @@
 
 #include "common/frame.glsl"
 #include "common/shading.glsl"
-#include "common/coverage.glsl"
 
 in vec3 p_world;
 in vec3 normal_world;
@@ -12,7 +11,6 @@ in vec4 color;
 flat in uint material;
 
 uniform vec3 eye_world;
-uniform int view;
 
 layout(location = 0) out vec4 radiance;
 
@@ -28,9 +26,7 @@ void main() {
     surface.material = material;
     surface.back = !gl_FrontFacing;
 
-    if (ALPHA_TESTED != 0) {
-        ivec3 pixel = ivec3(ivec2(gl_FragCoord.xy) + ivec2(0, frame.band_first), view);
-        if (!alpha_accepts_value(base_color_of(surface).a, material, pixel)) discard;
-    }
-    radiance = vec4(shade(surface, eye_world), 1.0);
+    radiance = shade(surface, eye_world);
+    if (ALPHA_TESTED != 0 && radiance.a < alpha_cutoff(material)) discard;
+    if (BLENDED == 0) radiance.a = 1.0;
 }

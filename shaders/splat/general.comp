@@ -97,7 +97,7 @@ void main() {
             if (!owns(edges.x, b, c, orientation) || !owns(edges.y, c, a, orientation) || !owns(edges.z, a, b, orientation)) continue;
             if (ALPHA_TESTED != 0) {
                 float x_mm = (float(column) + 0.5 - points.row_offset) * frame.column_mm;
-                if (!alpha_accepts(points.triangle, plane, eye_mm, x_mm, row_centre_mm(row), ivec3(column, row, view))) continue;
+                if (!alpha_accepts(points.triangle, plane, eye_mm, x_mm, row_centre_mm(row))) continue;
             }
             visit(view_pixel(row, view, column), depth, id);
         }

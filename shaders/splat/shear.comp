@@ -47,7 +47,7 @@ void main() {
         int end = clamp(max(column, next), low, high);
         for (int c = clamp(min(column, next), low, high); c < end; c++) {
             float x_mm = (float(c) + 0.5 - points.row_offset) * frame.column_mm;
-            if (ALPHA_TESTED != 0 && !alpha_accepts(points.triangle, plane, eye_mm, x_mm, y_mm, ivec3(c, row, view)))
+            if (ALPHA_TESTED != 0 && !alpha_accepts(points.triangle, plane, eye_mm, x_mm, y_mm))
                 continue;
             visit(line + uint(c), plane_depth(plane, eye_mm, x_mm, y_mm), id);
         }

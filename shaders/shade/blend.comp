@@ -1,0 +1,17 @@
+// Shading of the nearest blended surface, over what the view images hold.
+// In: Words of the blended batch's winners; otherwise as shade/ray.comp. In, out: view_images.
+
+layout(local_size_x = BLOCK, local_size_y = GROUP_BLOCKS) in;
+
+#include "shade/surface.glsl"
+
+layout(rgba16f, binding = 0) restrict uniform image2DArray view_images;
+
+void main() {
+    Visible seen = visible_pixel();
+    if (seen.nothing) return;
+    Surface surface = surface_at(seen.triangle, seen.pixel.z, frame.band_first + seen.pixel.y, seen.pixel.x);
+    vec4 over = shade(surface, eye_world_of(seen.pixel.z));
+    vec4 under = imageLoad(view_images, seen.pixel);
+    imageStore(view_images, seen.pixel, vec4(mix(under.rgb, over.rgb, over.a), 1.0));
+}

@@ -1,0 +1,68 @@
+// The surface that a visible view pixel shows, found from the pixel's word, and the list of blocks of
+// pixels that show any.
+
+#include "common/triangles.glsl"
+#include "common/surface.glsl"
+#include "common/vertices.glsl"
+#include "common/shading.glsl"
+#include "layout/BlockWork"
+
+layout(std430) readonly restrict buffer Words { uint words[]; };
+layout(std430) readonly restrict buffer Blocks { uint blocks[]; };
+layout(std430) readonly restrict buffer BlockWorkBlock { BlockWork block_work; };
+layout(std430) readonly restrict buffer Eyes { float eyes[]; };
+layout(std430) readonly restrict buffer RowOffsets { float row_offsets[]; };
+
+uniform mat4 world_from_display;
+uniform uint row_blocks;
+
+// A pixel of the views and what it shows. Nothing: background, or a triangle of another batch.
+struct Visible {
+    ivec3 pixel;  // column, row of the band, view
+    bool nothing;
+    uint triangle;
+};
+
+Visible visible_pixel() {
+    uint place = (gl_WorkGroupID.y * GROUPS_ACROSS + gl_WorkGroupID.x) * GROUP_BLOCKS + gl_LocalInvocationID.y;
+    uint block = place < block_work.blocks ? blocks[place] : 0u, line = block / row_blocks;
+    int column = int((block % row_blocks) * BLOCK + gl_LocalInvocationID.x);
+    Visible seen;
+    seen.pixel = ivec3(column, int(line) / frame.views, int(line) % frame.views);
+    seen.nothing = place >= block_work.blocks || column >= frame.columns;
+    if (seen.nothing) return seen;
+    seen.triangle = words[line * uint(frame.columns) + uint(column)] - frame.triangle_base;
+    seen.nothing = seen.triangle >= frame.triangles;
+    return seen;
+}
+
+vec3 eye_world_of(int view) {
+    return (world_from_display * vec4(eyes[view] * frame.column_mm, 0.0, frame.distance_mm, 1.0)).xyz;
+}
+
+Surface surface_at(uint triangle, int view, int row, int column) {
+    uvec4 corners = triangles[triangle];
+    vec3 a = display_positions[corners.x].xyz;
+    vec3 b = display_positions[corners.y].xyz;
+    vec3 c = display_positions[corners.z].xyz;
+    float eye_mm = eyes[view] * frame.column_mm;
+    float x_mm = (float(column) + 0.5 - row_offsets[row]) * frame.column_mm;
+    Plane plane = triangle_plane(a, b, c);
+    Hit hit = hit_triangle(a, b, c, plane, eye_mm, x_mm, row_centre_mm(row));
+    mat3x2 uv0 = mat3x2(tex_coords[corners.x], tex_coords[corners.y], tex_coords[corners.z]);
+    mat3x2 uv1 = mat3x2(vertex_uv1(corners.x), vertex_uv1(corners.y), vertex_uv1(corners.z));
+    uint facing = draws[corners.w].facing;
+
+    Surface surface;
+    surface.p_world = (world_from_display * vec4(hit.p_display, 1.0)).xyz;
+    surface.normal = mat3(direction_from(world_normals[corners.x]), direction_from(world_normals[corners.y]),
+                          direction_from(world_normals[corners.z])) * hit.weights;
+    surface.dp_dx = mat3(world_from_display) * hit.dp_dx;
+    surface.dp_dy = mat3(world_from_display) * hit.dp_dy;
+    surface.uv0 = Footprint(uv0 * hit.weights, uv0 * hit.weights_dx, uv0 * hit.weights_dy);
+    surface.uv1 = Footprint(uv1 * hit.weights, uv1 * hit.weights_dx, uv1 * hit.weights_dy);
+    surface.color = mat3x4(vertex_color(corners.x), vertex_color(corners.y), vertex_color(corners.z)) * hit.weights;
+    surface.material = draws[corners.w].material;
+    surface.back = (eye_side(plane, eye_mm) < 0.0) != ((facing & FACING_MIRRORED) != 0u);
+    return surface;
+}
