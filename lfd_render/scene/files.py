@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import binascii
+import os
 import re
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote, unquote_to_bytes
@@ -29,23 +30,30 @@ class SceneFiles:
         """The bytes behind a URI; `field` names its place in error messages."""
         if uri.startswith("data:"):
             return self._decode_data(uri, field)
-        return self._read(self._resolve(uri, field), f"{field}: '{_shorten(uri)}'")
+        return self._read(self._resolve(unquote(uri), field), f"{field}: '{_shorten(uri)}'")
 
-    def _resolve(self, uri: str, field: str) -> Path:
-        """The file of a relative URI, refused when it leads out of the scene's folder."""
-        name = unquote(uri)
+    def read_name(self, name: str, field: str) -> bytes:
+        """The bytes of a file in the scene's folder, by a plain name instead of a URI."""
+        return self._read(self._resolve(name, field), f"{field}: '{_shorten(name)}'")
+
+    def has_name(self, name: str, field: str) -> bool:
+        """Whether there is such a file; raises SceneError when the name leads elsewhere."""
+        return os.path.exists(self._resolve(name, field))  # unlike Path's, never raises
+
+    def _resolve(self, name: str, field: str) -> Path:
+        """The file of a relative name, refused when it leads out of the scene's folder."""
         parts = PurePosixPath(name).parts
         outside = name.startswith("/") or ".." in parts or "\\" in name or "\0" in name
         if not parts or outside or _SCHEME.match(name):
-            raise SceneError(f"{field}: '{_shorten(uri)}'; {_NEIGHBOURS_ONLY}")
+            raise SceneError(f"{field}: '{_shorten(name)}'; {_NEIGHBOURS_ONLY}")
         folder = self._scene.parent.resolve()
         try:
             path = (folder / name).resolve()
         except (OSError, RuntimeError) as error:  # a link that leads to itself
-            raise SceneError(f"{field}: '{_shorten(uri)}': {error}; {_NEIGHBOURS_ONLY}") from None
+            raise SceneError(f"{field}: '{_shorten(name)}': {error}; {_NEIGHBOURS_ONLY}") from None
         if not path.is_relative_to(folder):
             raise SceneError(
-                f"{field}: '{_shorten(uri)}' is a link out of the folder; {_NEIGHBOURS_ONLY}"
+                f"{field}: '{_shorten(name)}' is a link out of the folder; {_NEIGHBOURS_ONLY}"
             )
         return path
 

@@ -12,11 +12,16 @@ from lfd_render.scene.builtin import PREFIX, load_builtin
 from lfd_render.scene.gltf import load_gltf
 from lfd_render.scene.limits import LoadLimits
 from lfd_render.scene.model import Scene
+from lfd_render.scene.obj import load_obj
 
 _MESSAGE_LIMIT = 500  # characters; names in a file can be of any length
 
 
-_LOADERS: dict[str, Callable[[Path, LoadLimits], Scene]] = {".gltf": load_gltf, ".glb": load_gltf}
+_LOADERS: dict[str, Callable[[Path, LoadLimits], Scene]] = {
+    ".gltf": load_gltf,
+    ".glb": load_gltf,
+    ".obj": load_obj,
+}
 
 
 def load_scene(source: str | Path, limits: LoadLimits) -> Scene:

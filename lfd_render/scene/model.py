@@ -243,7 +243,7 @@ class Scene:
 
     @staticmethod
     def load(source: str | Path, limits: LoadLimits | None = None) -> Scene:
-        """Read a `.gltf` or `.glb` file, or make a `builtin:NAME?triangles=N`.
+        """Read a `.gltf`, `.glb` or `.obj` file, or make a `builtin:NAME?triangles=N`.
 
         Raises SceneError, or ResourceError beyond the limits, in one line that names the
         source, the field, the value and the remedy.

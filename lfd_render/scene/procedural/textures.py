@@ -59,7 +59,7 @@ def normal_pixels(height: Field) -> NDArray[np.uint8]:
     size = np.float32(len(height))
     slope_x = (np.roll(height, -1, axis=1) - np.roll(height, 1, axis=1)) * (size / 2)
     slope_y = (np.roll(height, 1, axis=0) - np.roll(height, -1, axis=0)) * (size / 2)
-    half: Field = np.float32(0.5) / np.sqrt(slope_x**2 + slope_y**2 + np.float32(1.0))
+    half = 0.5 / np.sqrt(slope_x**2 + slope_y**2 + np.float32(1.0))
     return to_pixels((0.5 - slope_x * half, 0.5 - slope_y * half, 0.5 + half))
 
 
