@@ -93,12 +93,13 @@ class _Timings:
 class Renderer:
     """Renders EIAs and views. It holds one GL context, which belongs to the thread that made it.
 
-    device: ``auto``, ``gpu``, ``software`` or an EGL index. Raises GpuError without OpenGL 4.5.
-    The scene of the last call stays uploaded, so that rendering it again is quick.
+    device: ``auto``, ``gpu``, ``software``, an EGL index, or an open Device, which stays the
+    caller's to close. Raises GpuError without OpenGL 4.5. The scene of the last call stays uploaded, so that rendering it again is quick.
     """
 
-    def __init__(self, device: str = "auto") -> None:
-        self.device = Device.open(device)
+    def __init__(self, device: str | Device = "auto") -> None:
+        self._owns_device = isinstance(device, str)
+        self.device = Device.open(device) if isinstance(device, str) else device
         self._scene: Scene | None = None
         self._buffers: SceneBuffers | None = None
 
@@ -115,8 +116,10 @@ class Renderer:
 
     def close(self) -> None:
         """Free the scene and the context."""
+        self.device.activate()
         self._drop_scene()
-        self.device.close()
+        if self._owns_device:
+            self.device.close()
 
     def render(
         self,
@@ -133,7 +136,12 @@ class Renderer:
         Raises SceneError, UsageError, ResourceError or GpuError.
         """
         choice = RenderOptions(views=views, **options)
-        camera = camera or camera_for(scene, display)
+        self.device.activate()
+        return self._render(scene, display, camera or camera_for(scene, display), choice)
+
+    def _render(
+        self, scene: Scene, display: DisplayProfile, camera: Camera, choice: RenderOptions
+    ) -> Eia:
         rig = display.rig(choice.views, choice.spacing)  # type: ignore[arg-type]  # rig() checks it
         grid = _grid(display, choice, rig.views)
         _check_in_front(scene, camera, rig)
@@ -191,8 +199,18 @@ class Renderer:
         size is by default one column a lens and the default rows. Otherwise as `render`.
         """
         choice = RenderOptions(views=views, **options)
-        camera = camera or camera_for(scene, display)
         rig = rig or display.rig(choice.views, choice.spacing)  # type: ignore[arg-type]  # checked there
+        self.device.activate()
+        return self._views(scene, display, camera or camera_for(scene, display), rig, choice)
+
+    def _views(
+        self,
+        scene: Scene,
+        display: DisplayProfile,
+        camera: Camera,
+        rig: Rig,
+        choice: RenderOptions,
+    ) -> NDArray[np.uint8]:
         width, height = choice.view_size or upright_size(display, display.views)
         grid = ViewGrid.upright(display, width, height)
         _check_in_front(scene, camera, rig)

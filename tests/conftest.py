@@ -101,8 +101,10 @@ def _gl_error_state(request: pytest.FixtureRequest) -> Iterator[None]:
         yield
         return
     device: Device = request.getfixturevalue("device")
+    device.activate()
     device.check()
     yield
+    device.activate()
     device.check()
 
 

@@ -82,6 +82,10 @@ class Device:
         """GL_RENDERER."""
         return self.info.renderer
 
+    def activate(self) -> None:
+        """Make this the thread's current context. Whoever has several calls it before each use."""
+        self.context.__enter__()
+
     def finish(self) -> None:
         """Wait until the device has done all that was asked."""
         self.context.finish()

@@ -39,14 +39,14 @@ class LayerTarget:
             )
             device.ledger.add("depth", 4 * texture.width * texture.height)
 
-    def use(self, layer: int) -> None:
-        """Draw into this layer from now on, all of it."""
+    def use(self, layer: int, rows: int | None = None) -> None:
+        """Draw into this layer from now on: its first `rows`, all by default."""
         raw = self._device.raw
         raw.glNamedFramebufferTextureLayer(
             self._name, gl.COLOR_ATTACHMENT0, self.texture.name, 0, layer
         )
         raw.glBindFramebuffer(gl.FRAMEBUFFER, self._name)
-        raw.glViewport(0, 0, self.texture.width, self.texture.height)
+        raw.glViewport(0, 0, self.texture.width, rows or self.texture.height)
 
     def clear(self, color: tuple[float, float, float, float]) -> None:
         """Set the layer in use to a colour and its depth to farthest."""

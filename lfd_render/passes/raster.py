@@ -60,7 +60,7 @@ class RasterForward:
         eye_mm = float(rig.eye_x_mm[view])
         eye_world = world_from_display @ np.array([eye_mm, 0.0, rig.distance_mm, 1.0])
         clip = band_clip_from_display(rig, self._target.grid, band, view)
-        self._layer.use(view)
+        self._layer.use(view, band.rows)
         self._layer.clear((*background, 0.0))
         raw.glEnable(gl.DEPTH_TEST)
         raw.glDepthFunc(gl.LESS)

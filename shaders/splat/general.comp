@@ -17,27 +17,47 @@ layout(std430) readonly restrict buffer PixelMatrices { mat4 pixel_matrices[]; }
 layout(std430) readonly restrict buffer RowShifts { int row_shifts[]; };  // matrix column − stored column
 layout(std430) readonly restrict buffer Eyes { float eyes[]; };
 
-struct Box {
-    vec2 low;   // column, row
-    vec2 high;
-    bool unbounded;
+// A convex polygon in display space: a triangle cut by up to three planes.
+struct Polygon {
+    vec3 points[6];
+    int count;
 };
 
-void extend(inout Box box, vec3 homogeneous) {
-    box.unbounded = box.unbounded || homogeneous.z < frame.near_mm;
-    vec2 p = homogeneous.xy / max(homogeneous.z, frame.near_mm);
-    box.low = min(box.low, p);
-    box.high = max(box.high, p);
+// Signed distance, times a positive factor, from the planes of a lattice row and a view's near plane.
+float inside(int plane, vec3 p, int row, mat4 pixel_from_display) {
+    float half_row = 0.5 * frame.row_mm;
+    if (plane == 0) return -above_row(p, row_centre_mm(row) + half_row);
+    if (plane == 1) return above_row(p, row_centre_mm(row) - half_row);
+    return (pixel_from_display * vec4(p, 1.0)).w - frame.near_mm;
 }
 
-// The part of an edge between two planes, given the signed distances of its ends; it may be empty.
-void extend_by_edge(inout Box box, vec3 p, vec3 q, vec2 below_upper, vec2 above_lower) {
-    vec2 part = positive_part(below_upper.x, below_upper.y);
-    vec2 other = positive_part(above_lower.x, above_lower.y);
-    part = vec2(max(part.x, other.x), min(part.y, other.y));
-    if (part.x > part.y) return;
-    extend(box, mix(p, q, part.x));
-    extend(box, mix(p, q, part.y));
+// Sutherland and Hodgman 1974.
+Polygon cut(Polygon polygon, int plane, int row, mat4 pixel_from_display) {
+    Polygon kept;
+    kept.count = 0;
+    for (int i = 0; i < polygon.count; i++) {
+        vec3 p = polygon.points[i], q = polygon.points[i + 1 < polygon.count ? i + 1 : 0];
+        float at_p = inside(plane, p, row, pixel_from_display), at_q = inside(plane, q, row, pixel_from_display);
+        if (at_p >= 0.0 && kept.count < 6) kept.points[kept.count++] = p;
+        if ((at_p >= 0.0) != (at_q >= 0.0) && kept.count < 6) kept.points[kept.count++] = mix(p, q, at_p / (at_p - at_q));
+    }
+    return kept;
+}
+
+// Lowest and highest column and row of what a view sees of a triangle's part on a lattice row, with one
+// pixel of margin for rounding; empty when low exceeds high.
+ivec4 footprint_box(mat3 corners_display, int row, mat4 pixel_from_display) {
+    Polygon polygon;
+    polygon.count = 3;
+    for (int i = 0; i < 3; i++) polygon.points[i] = corners_display[i];
+    for (int plane = 0; plane < 3; plane++) polygon = cut(polygon, plane, row, pixel_from_display);
+    vec2 low = vec2(1e6), high = vec2(-1e6);
+    for (int i = 0; i < polygon.count; i++) {
+        vec3 p = (pixel_from_display * vec4(polygon.points[i], 1.0)).xyw;
+        low = min(low, p.xy / max(p.z, frame.near_mm));
+        high = max(high, p.xy / max(p.z, frame.near_mm));
+    }
+    return ivec4(ivec2(floor(clamp(low, -1e6, 1e6))) - 1, ivec2(ceil(clamp(high, -1e6, 1e6))) + 1);
 }
 
 // Edge function of the edge p→q at the origin; exactly opposite for q→p.
@@ -60,32 +80,19 @@ void main() {
     PointRow points = point_rows[place];
     if (place >= work[window].items || view >= frame.views) return;
     uvec4 corners = triangles[points.triangle];
-    mat3 vertices_display = mat3(display_positions[corners.x].xyz, display_positions[corners.y].xyz, display_positions[corners.z].xyz);
-    mat4 matrix = pixel_matrices[view];
-    vec3 a = (matrix * vec4(vertices_display[0], 1.0)).xyw;
-    vec3 b = (matrix * vec4(vertices_display[1], 1.0)).xyw;
-    vec3 c = (matrix * vec4(vertices_display[2], 1.0)).xyw;
-
-    float upper = row_centre_mm(int(points.row)) + 0.5 * frame.row_mm, lower = upper - frame.row_mm;
-    vec3 below, above;
-    for (int i = 0; i < 3; i++) {
-        below[i] = -above_row(vertices_display[i], upper);
-        above[i] = above_row(vertices_display[i], lower);
-    }
-    Box box = Box(vec2(1e30), vec2(-1e30), false);
-    extend_by_edge(box, a, b, below.xy, above.xy);
-    extend_by_edge(box, b, c, below.yz, above.yz);
-    extend_by_edge(box, c, a, below.zx, above.zx);
-    if (box.unbounded) box = Box(vec2(-1e30), vec2(1e30), true);
+    mat3 corners_display = mat3(display_positions[corners.x].xyz, display_positions[corners.y].xyz, display_positions[corners.z].xyz);
+    mat4 pixel_from_display = pixel_matrices[view];
+    vec3 a = (pixel_from_display * vec4(corners_display[0], 1.0)).xyw;
+    vec3 b = (pixel_from_display * vec4(corners_display[1], 1.0)).xyw;
+    vec3 c = (pixel_from_display * vec4(corners_display[2], 1.0)).xyw;
+    ivec4 box = footprint_box(corners_display, int(points.row), pixel_from_display);
 
     Plane plane = row_plane(points);
     uint id = frame.triangle_base + points.triangle;
     float eye_mm = eyes[view] * frame.column_mm;
-    int row_end = min(frame.band_first + frame.band_rows, int(min(ceil(box.high.y), 1e6)) + 1);
-    for (int row = max(frame.band_first, int(max(floor(box.low.y), -1e6)) - 1); row < row_end; row++) {
+    for (int row = max(frame.band_first, box.y); row < min(frame.band_first + frame.band_rows, box.w); row++) {
         int shift = row_shifts[row];
-        int end = min(frame.columns, int(min(ceil(box.high.x), 1e6)) + 1 - shift);
-        for (int column = max(0, int(max(floor(box.low.x), -1e6)) - 1 - shift); column < end; column++) {
+        for (int column = max(0, box.x - shift); column < min(frame.columns, box.z - shift); column++) {
             vec2 centre = vec2(float(column + shift), float(row)) + 0.5;
             precise vec2 pa = a.xy - centre * a.z, pb = b.xy - centre * b.z, pc = c.xy - centre * c.z;
             vec3 edges = vec3(edge_function(pb, pc), edge_function(pc, pa), edge_function(pa, pb));

@@ -1,0 +1,99 @@
+"""Vertices, local space → display space; normals, local → world; and which id a triangle has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lfd_render.scene import Instance, Mesh, Scene
+
+Float64 = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """Every triangle of a scene, in the order of its id.
+
+    p_display, normals_world: [triangle, corner, xyz]; texcoords: [triangle, corner, set, uv];
+    colors: [triangle, corner, rgba], all float64. material, instance: int64 [triangle];
+    mirrored, double_sided: bool [triangle].
+    """
+
+    p_display: Float64
+    normals_world: Float64
+    texcoords: Float64
+    colors: Float64
+    material: NDArray[np.int64]
+    instance: NDArray[np.int64]
+    mirrored: NDArray[np.bool_]
+    double_sided: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.p_display)
+
+
+def ordered_instances(scene: Scene) -> Iterator[tuple[int, Instance, Mesh]]:
+    """Instances in the order of their triangles' ids: the opaque ones first, then those with alpha.
+
+    Yields the index of the instance, the instance and its mesh.
+    """
+    for opaque in (True, False):
+        for index, instance in enumerate(scene.instances):
+            mesh = scene.meshes[instance.mesh]
+            if (scene.materials[mesh.material].alpha_mode == "opaque") == opaque:
+                yield index, instance, mesh
+
+
+def placed(scene: Scene, display_from_world: Float64) -> Triangles:
+    """The triangles of a scene before a display. display_from_world: float64 [4, 4], affine."""
+    p_display, normals, texcoords, colors, material, instances = [], [], [], [], [], []
+    mirrored, double_sided = [], []
+    for index, instance, mesh in ordered_instances(scene):
+        corners = mesh.triangles
+        display_from_local = display_from_world @ instance.world_from_local
+        count = len(corners)
+        p_display.append(points_by(display_from_local, mesh.positions)[corners])
+        normals.append(normals_by(instance.world_from_local, mesh.normals)[corners])
+        texcoords.append(mesh.texcoords.astype(np.float64)[corners])
+        colors.append(mesh.colors.astype(np.float64)[corners])
+        material.append(np.full(count, mesh.material))
+        instances.append(np.full(count, index))
+        mirrored.append(np.full(count, np.linalg.det(display_from_local[:3, :3]) < 0.0))
+        double_sided.append(np.full(count, scene.materials[mesh.material].double_sided))
+    return Triangles(
+        np.concatenate(p_display),
+        np.concatenate(normals),
+        np.concatenate(texcoords),
+        np.concatenate(colors),
+        np.concatenate(material),
+        np.concatenate(instances),
+        np.concatenate(mirrored),
+        np.concatenate(double_sided),
+    )
+
+
+def points_by(matrix: Float64, points: NDArray[np.floating]) -> Float64:
+    """Points [n, 3] by an affine matrix [4, 4], in float64."""
+    moved: Float64 = points.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    return moved
+
+
+def normals_by(world_from_local: Float64, normals: NDArray[np.floating]) -> Float64:
+    """Unit normals [n, 3] by the inverse transpose of a placement, made unit again.
+
+    A normal n of a plane n·p = c keeps meeting the moved plane: n'·(M p) = c with n' = n·M⁻¹. A
+    placement without an inverse leaves normals as they are, since it flattens what they stand on.
+    """
+    linear = world_from_local[:3, :3]
+    singular = abs(np.linalg.det(linear)) < np.finfo(np.float64).tiny
+    turned = normals.astype(np.float64) @ (np.eye(3) if singular else np.linalg.inv(linear))
+    return unit(turned)
+
+
+def unit(vectors: Float64) -> Float64:
+    """Vectors [..., 3] at length 1; zero stays zero."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(length > 0.0, length, 1.0)
