@@ -17,6 +17,8 @@ from lfd_render.errors import ResourceError, SceneError
 from lfd_render.scene.limits import Budget
 from lfd_render.scene.model import Image
 
+_STRIP_PIXELS = 1 << 20
+
 
 @dataclass(frozen=True)
 class ImageRequest:
@@ -48,9 +50,11 @@ def decode_images(requests: Sequence[ImageRequest], budget: Budget) -> tuple[Ima
 def _decode(request: ImageRequest, budget: Budget) -> Image:
     data = request.read()
     try:
+        if _is_webp(data):  # its plugin makes room for all pixels as soon as it opens a file
+            _check_size(*_webp_size(data), budget, request.label)
         with _open(data, request.label) as picture:
-            width, height = picture.size
-            _check_size(width, height, budget, request.label)
+            _check_size(*picture.size, budget, request.label)
+            budget.take("texels", picture.width * picture.height)
             return Image(request.name, _rgba(picture))
     except (SceneError, ResourceError):
         raise
@@ -72,7 +76,7 @@ def _open(data: bytes, label: str) -> ImageFile.ImageFile:
         return PngImagePlugin.PngImageFile(stream)
     if data.startswith(b"\xff\xd8\xff"):
         return JpegImagePlugin.JpegImageFile(stream)
-    if data.startswith(b"RIFF") and data[8:12] == b"WEBP":
+    if _is_webp(data):
         return WebPImagePlugin.WebPImageFile(stream)
     start = data[:8].hex(" ") or "nothing"
     raise SceneError(f"{label}: starts with {start}; give a PNG, JPEG or WebP")
@@ -84,13 +88,43 @@ def _check_size(width: int, height: int, budget: Budget, label: str) -> None:
             f"{label}: {width} × {height} pixels; the limit is {budget.limits.image_pixels}, "
             "give a smaller picture"
         )
-    budget.take("texels", width * height)
+
+
+def _is_webp(data: bytes) -> bool:
+    return data.startswith(b"RIFF") and data[8:12] == b"WEBP"
+
+
+def _webp_size(data: bytes) -> tuple[int, int]:
+    """Width and height from the first chunk of a WebP file (RFC 9649, section 2)."""
+    kind, body = data[12:16], data[20:30].ljust(10, b"\0")
+    if kind == b"VP8X":  # three bytes each, less one
+        return int.from_bytes(body[4:7], "little") + 1, int.from_bytes(body[7:10], "little") + 1
+    if kind == b"VP8L":  # 14 bits each, less one, after a signature byte
+        bits = int.from_bytes(body[1:5], "little")
+        return (bits & 0x3FFF) + 1, (bits >> 14 & 0x3FFF) + 1
+    # VP8: 14 bits each after a frame tag and a start code
+    bits = int.from_bytes(body[6:10], "little")
+    return bits & 0x3FFF, bits >> 16 & 0x3FFF
 
 
 def _rgba(picture: PillowImage.Image) -> NDArray[np.uint8]:
-    """Pixels as [y, x, 4] uint8; 16-bit grey keeps its upper byte, absent alpha is opaque."""
-    if picture.mode in ("I;16", "I;16B", "I"):
-        grey = (np.asarray(picture).astype(np.uint32) >> 8).astype(np.uint8)
-        opaque = np.full_like(grey, 255)
-        return np.stack((grey, grey, grey, opaque), axis=-1)
-    return np.asarray(picture if picture.mode == "RGBA" else picture.convert("RGBA"))
+    """Pixels as [y, x, 4] uint8; 16-bit grey keeps its upper byte, absent alpha is opaque.
+
+    Converted strip by strip: a 16K × 16K picture takes 1 GB decoded, and whole copies would
+    triple that.
+    """
+    picture.load()
+    width, height = picture.size
+    pixels = np.empty((height, width, 4), np.uint8)
+    rows = max(_STRIP_PIXELS // width, 1)
+    for top in range(0, height, rows):
+        strip = picture.crop((0, top, width, min(top + rows, height)))
+        pixels[top : top + rows] = _strip_rgba(strip)
+    return pixels
+
+
+def _strip_rgba(strip: PillowImage.Image) -> NDArray[np.uint8]:
+    if strip.mode in ("I;16", "I;16B", "I"):
+        grey = (np.asarray(strip).astype(np.uint32) >> 8).astype(np.uint8)
+        return np.stack((grey, grey, grey, np.full_like(grey, 255)), axis=-1)
+    return np.asarray(strip if strip.mode == "RGBA" else strip.convert("RGBA"))

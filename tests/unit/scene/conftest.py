@@ -13,6 +13,9 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image as PillowImage
 
+from lfd_render.errors import LfdError, SceneError
+from lfd_render.scene import LoadLimits, Scene
+
 COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 
@@ -133,3 +136,23 @@ def picture_bytes() -> Callable[..., bytes]:
         return stream.getvalue()
 
     return encode
+
+
+@pytest.fixture
+def message() -> Callable[..., str]:
+    """``message(path, SceneError, nodes=3)``: what a bad scene's error says after its path.
+
+    The general promises are checked on the way: the class, the file's name, one line, a remedy.
+    """
+
+    def load(path: Path | str, kind: type[LfdError] = SceneError, **limits: int) -> str:
+        with pytest.raises(LfdError) as caught:
+            Scene.load(path, LoadLimits(**limits) if limits else None)
+        text = str(caught.value)
+        assert type(caught.value) is kind
+        assert text.startswith(f"{path}: ")
+        assert text.isprintable()  # so it is one line
+        assert ";" in text, "no remedy"
+        return text.removeprefix(f"{path}: ")
+
+    return load
