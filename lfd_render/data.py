@@ -14,5 +14,6 @@ def data_folder(name: str) -> Path:
         if candidate.is_dir():
             return candidate
     raise FileNotFoundError(
-        f"data folder '{name}' is neither in {_PACKAGE} nor in {_PACKAGE.parent}; reinstall lfd-render"
+        f"data folder '{name}' is neither in {_PACKAGE} nor in {_PACKAGE.parent}; "
+        "reinstall lfd-render"
     )

@@ -13,16 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.display import Camera, DisplayProfile, Rig, ViewGrid
+from lfd_render.display.model import Spacing
 from lfd_render.errors import SceneError, UsageError
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.scene_buffers import SceneBuffers
 from lfd_render.panel.eia import Eia
 from lfd_render.passes.encode import Encode
+from lfd_render.passes.placement import Placement
 from lfd_render.passes.view_target import ViewTarget
 from lfd_render.passes.weave import Weave
 from lfd_render.scene import Scene
-from lfd_render.techniques import Lfdpr, Mvr, Placement, Technique
+from lfd_render.techniques import Lfdpr, Mvr, Technique
 
 REPEAT_TURN_RAD = np.deg2rad(0.5)  # how far the scene turns between repeated frames
 TECHNIQUES = ("lfdpr", "mvr")
@@ -40,7 +42,7 @@ class RenderOptions:
     view_size: tuple[int, int] | None = None
     technique: str = "lfdpr"
     preset: str = "default"
-    spacing: str | None = None
+    spacing: Spacing | None = None
     seed: int = 0
     repeat: int = 1
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -50,7 +52,9 @@ class RenderOptions:
     def __post_init__(self) -> None:
         """Check ranges; raises UsageError."""
         if self.technique not in TECHNIQUES:
-            raise UsageError(f"technique '{self.technique}': unknown; use {' or '.join(TECHNIQUES)}")
+            raise UsageError(
+                f"technique '{self.technique}': unknown; use {' or '.join(TECHNIQUES)}"
+            )
         if self.preset not in PRESETS:
             raise UsageError(f"preset '{self.preset}': unknown; use {' or '.join(PRESETS)}")
         if self.projection not in PROJECTIONS:
@@ -94,7 +98,8 @@ class Renderer:
     """Renders EIAs and views. It holds one GL context, which belongs to the thread that made it.
 
     device: ``auto``, ``gpu``, ``software``, an EGL index, or an open Device, which stays the
-    caller's to close. Raises GpuError without OpenGL 4.5. The scene of the last call stays uploaded, so that rendering it again is quick.
+    caller's to close. Raises GpuError without OpenGL 4.5. The scene of the last call stays
+    uploaded, so that rendering it again is quick.
     """
 
     def __init__(self, device: str | Device = "auto") -> None:
@@ -142,39 +147,42 @@ class Renderer:
     def _render(
         self, scene: Scene, display: DisplayProfile, camera: Camera, choice: RenderOptions
     ) -> Eia:
-        rig = display.rig(choice.views, choice.spacing)  # type: ignore[arg-type]  # rig() checks it
+        rig = display.rig(choice.views, choice.spacing)
         grid = _grid(display, choice, rig.views)
         _check_in_front(scene, camera, rig)
         timings = _Timings()
         buffers = self._upload(scene, timings)
 
-        def compile_all() -> tuple[Technique, Weave, Encode]:
+        def compile_all() -> _PanelFrames:
             technique = self._technique(buffers, rig, grid, choice)
-            weave = Weave(self.device, display, grid, rig.views)
-            encode = Encode(self.device, *display.resolution_px)
-            self._warm_up(technique, weave, encode, camera, choice)
-            return technique, weave, encode
+            frames = _PanelFrames(self.device, technique, display, choice.exposure)
+            frames.warm_up(Placement(camera.display_from_world(rig.panel_mm), choice.background))
+            return frames
 
-        technique, weave, encode = timings.measure("compile", self.device, compile_all)
+        frames = timings.measure("compile", self.device, compile_all)
         try:
             for index in range(choice.repeat):
                 turned = camera.turned((index - choice.repeat + 1) * float(REPEAT_TURN_RAD))
-                placement = Placement(
-                    turned.display_from_world(display.size_mm), choice.background
-                )
-                self._frame(technique, weave, encode, placement, choice.exposure, timings)
-            linear, pixels = timings.measure(
-                "read", self.device, lambda: (weave.read_linear(), encode.read())
-            )
+                matrix = turned.display_from_world(rig.panel_mm)
+                timings.frames.append(frames.run(Placement(matrix, choice.background)))
+            linear, pixels = timings.measure("read", self.device, frames.read)
             report = {
-                **self._report(technique, scene, buffers, rig, grid, choice),
+                "technique": choice.technique,
+                "preset": choice.preset,
+                "views": rig.views,
+                "view_size": [grid.columns, grid.rows],
+                "view_grid": grid.kind,
+                "triangles": scene.triangle_count,
+                "points": frames.technique.count_points(),
+                "renderer": self.device.name,
+                "device_bytes": self.device.ledger.peak,
+                "warnings": list(buffers.warnings),
                 "camera": camera.to_json_dict(),
                 "timings_ms": timings.summary(),
             }
             self.device.check()
         finally:
-            for owner in (technique, weave, encode):
-                owner.release()
+            frames.release()
         metadata = {
             "lfd:profile": display.name,
             "lfd:profile-hash": display.hash,
@@ -199,7 +207,7 @@ class Renderer:
         size is by default one column a lens and the default rows. Otherwise as `render`.
         """
         choice = RenderOptions(views=views, **options)
-        rig = rig or display.rig(choice.views, choice.spacing)  # type: ignore[arg-type]  # checked there
+        rig = rig or display.rig(choice.views, choice.spacing)
         self.device.activate()
         return self._views(scene, display, camera or camera_for(scene, display), rig, choice)
 
@@ -230,6 +238,8 @@ class Renderer:
                     encode(technique.target.images, view, choice.exposure)
                     rows = slice(band.first, band.first + band.rows)
                     pictures[view, rows] = encode.read()[: band.rows]
+            complete = technique.complete()
+            assert complete, "the warm-up made room for the points of this very placement"
             self.device.check()
         finally:
             technique.release()
@@ -265,70 +275,55 @@ class Renderer:
             general=choice.projection == "general",
         )
 
-    def _warm_up(
-        self,
-        technique: Technique,
-        weave: Weave,
-        encode: Encode,
-        camera: Camera,
-        choice: RenderOptions,
-    ) -> None:
-        """Run one row of everything: a software device compiles shaders when they first run."""
-        clock = StageClock(self.device)
-        panel_mm = technique.target.rig.panel_mm
-        technique.begin(Placement(camera.display_from_world(panel_mm), choice.background), clock)
-        technique.warm_up(clock)
-        weave(technique.target, technique.target.warm_up_band)
-        encode(weave.panel, 0, choice.exposure)
 
-    def _frame(
-        self,
-        technique: Technique,
-        weave: Weave,
-        encode: Encode,
-        placement: Placement,
-        exposure: float,
-        timings: _Timings,
+class _PanelFrames:
+    """Frames of one technique, from camera to encoded panel image."""
+
+    def __init__(
+        self, device: Device, technique: Technique, display: DisplayProfile, exposure: float
     ) -> None:
-        """One frame, from camera to encoded panel image."""
+        self.technique = technique
+        self._device = device
+        self._exposure = exposure
+        target = technique.target
+        self._weave = Weave(device, display, target.grid, target.rig.views)
+        self._encode = Encode(device, *display.resolution_px)
+
+    def warm_up(self, placement: Placement) -> None:
+        """Run a little of everything: a software device compiles shaders when they first run."""
+        clock = StageClock(self._device)
+        self.technique.begin(placement, clock)
+        self.technique.warm_up(clock)
+        self._weave(self.technique.target.warm_up_band)
+        self._encode(self._weave.panel, 0, self._exposure)
+
+    def run(self, placement: Placement) -> tuple[float, dict[str, float]]:
+        """One frame: its milliseconds, whole and by stage."""
         complete = False
         while not complete:
-            clock = StageClock(self.device)
-            self.device.finish()
+            clock = StageClock(self._device)
+            self._device.finish()
             start = time.perf_counter()
-            technique.begin(placement, clock)
-            for band in technique.target.bands:
-                technique.render(band, clock)
+            self.technique.begin(placement, clock)
+            for band in self.technique.target.bands:
+                self.technique.render(band, clock)
                 with clock.stage("weave"):
-                    weave(technique.target, band)
+                    self._weave(band)
             with clock.stage("encode_srgb"):
-                encode(weave.panel, 0, exposure)
-            self.device.finish()
+                self._encode(self._weave.panel, 0, self._exposure)
+            self._device.finish()
             elapsed_ms = 1000.0 * (time.perf_counter() - start)
-            complete = technique.complete()
-        timings.frames.append((elapsed_ms, clock.stages_ms))
+            complete = self.technique.complete()
+        return elapsed_ms, clock.stages_ms
 
-    def _report(
-        self,
-        technique: Technique,
-        scene: Scene,
-        buffers: SceneBuffers,
-        rig: Rig,
-        grid: ViewGrid,
-        choice: RenderOptions,
-    ) -> dict[str, Any]:
-        return {
-            "technique": choice.technique,
-            "preset": choice.preset,
-            "views": rig.views,
-            "view_size": [grid.columns, grid.rows],
-            "view_grid": grid.kind,
-            "triangles": scene.triangle_count,
-            "points": technique.count_points(),
-            "renderer": self.device.name,
-            "device_bytes": self.device.ledger.peak,
-            "warnings": list(buffers.warnings),
-        }
+    def read(self) -> tuple[NDArray[np.float16], NDArray[np.uint8]]:
+        """The last frame in linear light and encoded."""
+        return self._weave.read_linear(), self._encode.read()
+
+    def release(self) -> None:
+        """Free everything, the technique included."""
+        for owner in (self.technique, self._weave, self._encode):
+            owner.release()
 
 
 def camera_for(scene: Scene, display: DisplayProfile) -> Camera:

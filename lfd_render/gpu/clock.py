@@ -1,7 +1,7 @@
 """Honest stage times: wall clock between finishes.
 
-On llvmpipe GL_TIME_ELAPSED reads 1e-6 ms for a dispatch of 137 ms, and moderngl's queries are 32-bit
-nanoseconds that wrap at 4.29 s, so no query is used.
+On llvmpipe GL_TIME_ELAPSED reads 1e-6 ms for a dispatch of 137 ms, and moderngl's queries are
+32-bit nanoseconds that wrap at 4.29 s, so no query is used.
 """
 
 from __future__ import annotations

@@ -84,7 +84,7 @@ class Device:
 
     def activate(self) -> None:
         """Make this the thread's current context. Whoever has several calls it before each use."""
-        self.context.__enter__()
+        self.context.__enter__()  # type: ignore[no-untyped-call]  # moderngl types its methods only
 
     def finish(self) -> None:
         """Wait until the device has done all that was asked."""

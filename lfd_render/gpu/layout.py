@@ -101,8 +101,8 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("uint", "items"),
         ("uint", "visible"),  # triangles of all windows
     ),
-    # A triangle on one row, ready for all views: the slice's ends (column = a_column + a_toward·eye),
-    # the plane, and the points along it, cells of the densest eye's columns.
+    # A triangle on one row, ready for all views: the slice's ends (column = a_column +
+    # a_toward·eye), the plane, and the points along it, cells of the densest eye's columns.
     "PointRow": (
         ("float", "a_column"),
         ("float", "a_toward"),

@@ -63,7 +63,7 @@ class Buffer:
         self.glo.write(np.ascontiguousarray(array).tobytes(), offset=offset)
 
     def read(self, dtype: DTypeLike, count: int = -1) -> NDArray[Any]:
-        """The buffer's first `count` elements (all by default) as an array. Waits for the device."""
+        """The first `count` elements (all by default) as an array. Waits for the device."""
         size = -1 if count < 0 else count * np.dtype(dtype).itemsize
         return np.frombuffer(self.glo.read(size), dtype=dtype)
 
@@ -77,10 +77,11 @@ class Buffer:
         self.glo.release()
 
 
+_BYTES_PER_TEXEL = {gl.RGBA8: 4, gl.SRGB8_ALPHA8: 4, gl.RGBA16F: 8}
+
+
 class TextureArray:
     """A 2D array texture with immutable storage: [layer, y, x], row 0 as uploaded."""
-
-    BYTES_PER_TEXEL = {gl.RGBA8: 4, gl.SRGB8_ALPHA8: 4, gl.RGBA16F: 8}
 
     def __init__(
         self,
@@ -110,7 +111,7 @@ class TextureArray:
         device.check()
         self.size = sum(
             max(1, width >> level) * max(1, height >> level) for level in range(levels)
-        ) * (layers * self.BYTES_PER_TEXEL[internal_format])
+        ) * (layers * _BYTES_PER_TEXEL[internal_format])
         device.ledger.add(label, self.size)
 
     def upload(self, layer: int, pixels: NDArray[np.uint8]) -> None:
@@ -163,12 +164,12 @@ class TextureArray:
 
 
 class TableTexture:
-    """A table of four 32-bit words an entry, read by texelFetch: device memory that software devices
-    gather from faster than from storage blocks."""
+    """A table of four 32-bit words an entry, read by texelFetch: software devices gather from it
+    faster than from storage blocks."""
 
     def __init__(self, device: Device, label: str, words: NDArray[np.uint32]) -> None:
         """words: uint32 [n, 4], n at most the device's texture size."""
-        assert words.ndim == 2 and words.shape[1] == 4
+        assert words.shape == (len(words), 4)
         self.label = label
         self.size = words.nbytes
         self._device = device

@@ -1,8 +1,8 @@
 """A scene on the device: batches of triangles, draws, materials and textures.
 
-A batch holds triangles of one alpha mode, of as many draws as fit the limits;
-ids of triangles run through the batches. What depends on the camera, the draws' matrices, is written
-each frame; everything else is uploaded once.
+A batch holds triangles of one alpha mode, of as many draws as fit the limits; ids of triangles run
+through the batches. What depends on the camera, the draws' matrices, is written each frame;
+everything else is uploaded once.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ class _Attributes:
     uv0: NDArray[np.float32]
     extras: NDArray[np.void]
 
-    def __getitem__(self, used: NDArray[np.intp]) -> _Attributes:
+    def of(self, used: NDArray[np.uint32]) -> _Attributes:
+        """Those of some vertices."""
         return _Attributes(self.normals[used], self.uv0[used], self.extras[used])
 
 
@@ -91,7 +92,9 @@ class Batch:
         normals = np.concatenate([a.normals for a in attributes])
         self.local_normals = Buffer.of(device, "normals", normals)
         self.world_normals = Buffer(device, "normals", normals.nbytes)
-        self.uv0 = Buffer.of(device, "texture coordinates", np.concatenate([a.uv0 for a in attributes]))
+        self.uv0 = Buffer.of(
+            device, "texture coordinates", np.concatenate([a.uv0 for a in attributes])
+        )
         self.extras = Buffer.of(
             device, "vertex extras", np.concatenate([a.extras for a in attributes])
         )
@@ -273,7 +276,7 @@ def _split(draw: int, mesh: Mesh, vertices: _Attributes) -> Iterator[_Part]:
     for first in range(0, len(mesh.triangles), step):
         used, triangles = np.unique(mesh.triangles[first : first + step], return_inverse=True)
         corners = triangles.reshape(-1, 3).astype(np.uint32)
-        yield _Part(draw, mesh.positions[used], vertices[used], corners)
+        yield _Part(draw, mesh.positions[used], vertices.of(used), corners)
 
 
 def _attributes(mesh: Mesh, *, extras: bool) -> _Attributes:
@@ -292,8 +295,8 @@ def _octahedral(normals: NDArray[np.float32]) -> NDArray[np.uint32]:
     signs = np.where(n[:, :2] < 0.0, -1.0, 1.0)
     folded = (1.0 - np.abs(n[:, 1::-1])) * signs
     flat = np.where(n[:, 2:] < 0.0, folded, n[:, :2])
-    words = np.rint(flat * 32767.0).astype(np.int16).astype(np.uint16).astype(np.uint32)
-    return words[:, 0] | words[:, 1] << 16
+    words = np.rint(flat * 32767.0).astype(np.int16)
+    return np.ascontiguousarray(words).view(np.uint32)[:, 0]  # x in the low half
 
 
 def _material_records(scene: Scene) -> NDArray[np.void]:

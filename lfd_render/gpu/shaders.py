@@ -48,7 +48,10 @@ def assemble(path: str, constants: Mapping[str, int | float] | None = None) -> S
     source = Source(path, "")
     defines = {**layout.CONSTANTS, **(constants or {})}
     assert all(name.isupper() for name in defines), "shader constants are upper case"
-    lines = [VERSION_LINE, *(f"#define {name} {_literal(value)}" for name, value in defines.items())]
+    lines = [
+        VERSION_LINE,
+        *(f"#define {name} {_literal(value)}" for name, value in defines.items()),
+    ]
     _append(source, lines, path, data_folder("shaders"))
     source.text = "\n".join(lines) + "\n"
     return source

@@ -29,8 +29,8 @@ _Key = tuple[bool, int, int, str, str]  # sRGB, width, height, wrap s, wrap t
 class MaterialTextures:
     """The arrays of both colour spaces, and the slot table that points into them.
 
-    slots: a word each [material × role]; uv_transforms: UvTransform [material × role]. srgb, linear: never empty, since GLSL has no
-    arrays of no samplers; a single white texel stands in.
+    slots: a word each [material × role]; uv_transforms: UvTransform [material × role]. srgb,
+    linear: never empty, since GLSL has no arrays of no samplers; a white texel stands in.
     """
 
     def __init__(
@@ -76,7 +76,9 @@ class MaterialTextures:
         while len(set(merged)) > units:
             counts = {key: merged.count(key) for key in merged}
             rarest = min(counts, key=lambda key: counts[key])
-            alike = [k for k in counts if k != rarest and (k[0], *k[3:]) == (rarest[0], *rarest[3:])]
+            alike = [
+                k for k in counts if k != rarest and (k[0], *k[3:]) == (rarest[0], *rarest[3:])
+            ]
             if not alike:
                 break
             area = rarest[1] * rarest[2]

@@ -12,7 +12,7 @@ from lfd_render.gpu.framebuffer import IndexedDraws, LayerTarget
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import RasterProgram, Uniform
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
-from lfd_render.passes.shade import gl_matrix
+from lfd_render.passes.placement import Placement, gl_matrix
 from lfd_render.passes.view_target import Band, ViewTarget
 
 _Camera = dict[str, Uniform]
@@ -47,21 +47,15 @@ class RasterForward:
             program = self._programs[batch.alpha_mode]
             self._draws.append(IndexedDraws(device, program, self._indices[-1]))
 
-    def __call__(
-        self,
-        view: int,
-        band: Band,
-        world_from_display: NDArray[np.float64],
-        background: tuple[float, float, float],
-    ) -> None:
+    def __call__(self, view: int, band: Band, placement: Placement) -> None:
         """Render one view's rows of a band, row 0 of the layer on top."""
         rig = self._target.rig
         raw = self._device.raw
         eye_mm = float(rig.eye_x_mm[view])
-        eye_world = world_from_display @ np.array([eye_mm, 0.0, rig.distance_mm, 1.0])
+        eye_world = placement.world_from_display @ np.array([eye_mm, 0.0, rig.distance_mm, 1.0])
         clip = band_clip_from_display(rig, self._target.grid, band, view)
         self._layer.use(view, band.rows)
-        self._layer.clear((*background, 0.0))
+        self._layer.clear((*placement.background, 0.0))
         raw.glEnable(gl.DEPTH_TEST)
         raw.glDepthFunc(gl.LESS)
         raw.glEnable(gl.CLIP_DISTANCE0)
@@ -69,7 +63,7 @@ class RasterForward:
         raw.glCullFace(gl.BACK)
         camera: _Camera = {
             "clip_from_display": gl_matrix(clip),
-            "world_from_display": gl_matrix(world_from_display),
+            "world_from_display": gl_matrix(placement.world_from_display),
             "eye_mm": eye_mm,
             "eye_world": tuple(eye_world[:3]),
         }
@@ -115,14 +109,12 @@ class RasterForward:
             "LocalPositions": batch.local_positions,
             "Draws": self._scene.draws,
             **batch.attributes(),
-            "FrameBlock": self._target.frame(band, batch),
+            "FrameBlock": band.frame(batch),
             **self._scene.materials_of(),
         }
         samplers = self._scene.samplers()
         for run in self._scene.runs(batch):
-            self._programs[batch.alpha_mode].set(
-                buffers, camera, samplers
-            )
+            self._programs[batch.alpha_mode].set(buffers, camera, samplers)
             (raw.glDisable if run.double_sided else raw.glEnable)(gl.CULL_FACE)
             # Row 0 at the raster's bottom turns windings over.
             raw.glFrontFace(gl.CCW if run.mirrored else gl.CW)
@@ -139,14 +131,12 @@ class RasterForward:
         self._layer.release()
 
 
-def band_clip_from_display(
-    rig: Rig, grid: ViewGrid, band: Band, view: int
-) -> NDArray[np.float64]:
-    """clip_from_display, float64 [4, 4], of one view's band: column c of row r has its centre at the
-    raster's (c + ½, r − band.first + ½), row 0 at the bottom.
+def band_clip_from_display(rig: Rig, grid: ViewGrid, band: Band, view: int) -> NDArray[np.float64]:
+    """clip_from_display, float64 [4, 4], of one view's band: column c of row r has its centre at
+    the raster's (c + ½, r − band.first + ½), row 0 at the bottom.
 
-    column·d = D·X/column_mm + (d − D)·eye + offset·d, with an offset linear in the row (`upright` or
-    `sheared` grids), and row·d = (h/2·d − D·Y)/row_mm; d = D − Z; depth d − 2·near.
+    column·d = D·X/column_mm + (d − D)·eye + offset·d, with an offset linear in the row (`upright`
+    or `sheared` grids), and row·d = (h/2·d − D·Y)/row_mm; d = D − Z; depth d − 2·near.
     """
     distance = rig.distance_mm
     height = rig.panel_mm[1]
@@ -158,9 +148,7 @@ def band_clip_from_display(
 
     depth = np.array([0.0, 0.0, -1.0, distance])
     row = 0.5 * height / row_mm * depth + np.array([0.0, -distance / row_mm, 0.0, 0.0])
-    column = (
-        np.array([distance / grid.column_mm, 0.0, -eye, 0.0]) + start * depth + slope * row
-    )
+    column = np.array([distance / grid.column_mm, 0.0, -eye, 0.0]) + start * depth + slope * row
     return np.stack(
         [
             2.0 / grid.columns * column - depth,

@@ -11,7 +11,7 @@ from lfd_render.gpu.layout import dtype
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
-from lfd_render.passes.view_target import Band, ViewTarget
+from lfd_render.passes.view_target import Band
 
 SEGMENT = 64  # triangles a thread of the prefix sum takes
 GROUPS_ACROSS = 32768  # work groups along x before y grows
@@ -49,7 +49,7 @@ class PointCloud:
 
 
 class Sample:
-    """Batch, ViewTarget → PointCloud.
+    """Batch, Band → PointCloud.
 
     Clips at the near plane, culls triangles that no view faces or that reach no row centre, sets
     each triangle's point length (Gavane and Watson 2024, section 3.1), sums the rows and writes
@@ -122,9 +122,9 @@ class Sample:
         points.work = Buffer(self._device, "points", dtype("Work").itemsize * points.windows)
         return True
 
-    def __call__(self, batch: Batch, target: ViewTarget, band: Band, points: PointCloud) -> None:
+    def __call__(self, batch: Batch, points: PointCloud, band: Band) -> None:
         """Sample one batch and band: all but the rows, window by window."""
-        frame = {"FrameBlock": target.frame(band, batch)}
+        frame = {"FrameBlock": band.frame(batch)}
         self._span.set(
             {
                 **batch.geometry(),
@@ -149,7 +149,7 @@ class Sample:
             },
             {
                 "segment_count": segments,
-                "view_blocks": -(-target.rig.views // self._view_lanes),
+                "view_blocks": -(-band.target.rig.views // self._view_lanes),
                 "windows": points.windows,
                 "window_items": points.window_items,
             },
@@ -165,34 +165,32 @@ class Sample:
         )
         self._compact.run(groups)
 
-    def rows(
-        self, batch: Batch, target: ViewTarget, band: Band, points: PointCloud, window: int
-    ) -> None:
+    def rows(self, batch: Batch, points: PointCloud, band: Band, window: int) -> None:
         """Write the rows of one window of items."""
         self._rows.set(
             {
                 **batch.geometry(),
                 "Draws": self._scene.draws,
-                "FrameBlock": target.frame(band, batch),
+                "FrameBlock": band.frame(batch),
                 "Spans": points.spans,
                 "VisibleTriangles": points.visible,
                 "WorkBlock": points.work,
-                "RowOffsets": target.row_offsets,
+                "RowOffsets": band.target.row_offsets,
                 "PointRows": points.rows,
             },
             {"window": window},
         )
         self._rows.run_indirect(points.work, window * dtype("Work").itemsize + _ROWS_DISPATCH)
 
-    def count(self, batch: Batch, target: ViewTarget, band: Band, points: PointCloud) -> int:
+    def count(self, batch: Batch, points: PointCloud, band: Band) -> int:
         """Points of one batch and band. Samples, counts and waits: not for a frame."""
         self._total.fill(0)
-        self(batch, target, band, points)
+        self(batch, points, band)
         for window in range(points.windows):
-            self.rows(batch, target, band, points, window)
+            self.rows(batch, points, band, window)
             self._count.set(
                 {
-                    "FrameBlock": target.frame(band, batch),
+                    "FrameBlock": band.frame(batch),
                     "PointRows": points.rows,
                     "WorkBlock": points.work,
                     "PointCount": self._total,

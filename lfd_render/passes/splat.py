@@ -9,7 +9,7 @@ from lfd_render.display import Rig, ViewGrid
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.layout import CONSTANTS, dtype
 from lfd_render.gpu.memory import Buffer
-from lfd_render.gpu.programs import Kernel
+from lfd_render.gpu.programs import Kernel, Samplers, Uniform
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.sample import GROUPS_ACROSS, PointCloud
 from lfd_render.passes.view_target import Band, ViewTarget
@@ -24,8 +24,8 @@ def view_lanes(views: int) -> int:
 
 
 class ViewBuffers:
-    """The winner of each view pixel of a band, [row of the band, view, column]: depths as float bits,
-    words as global triangle ids or NO_TRIANGLE."""
+    """The winner of each view pixel of a band, [row of the band, view, column]: depths as float
+    bits, words as global triangle ids or NO_TRIANGLE."""
 
     def __init__(self, device: Device, target: ViewTarget) -> None:
         self.depths = Buffer(device, "view buffers", 4 * target.band_pixels)
@@ -81,68 +81,50 @@ class Splat:
         }
 
     def depths(
-        self,
-        batch: Batch,
-        points: PointCloud,
-        window: int,
-        target: ViewTarget,
-        band: Band,
-        views: ViewBuffers,
+        self, batch: Batch, points: PointCloud, window: int, band: Band, views: ViewBuffers
     ) -> None:
         """Lower each pixel's depth to the nearest of a window of points."""
-        self._run(_DEPTH, batch, points, window, target, band, views)
+        kernel = self._kernels[_DEPTH, batch.alpha_mode == "mask"]
+        kernel.set(self._buffers(batch, points, band, views), *self._others(window))
+        kernel.run_indirect(points.work, window * dtype("Work").itemsize)
 
     def winners(
-        self,
-        batch: Batch,
-        points: PointCloud,
-        window: int,
-        target: ViewTarget,
-        band: Band,
-        views: ViewBuffers,
+        self, batch: Batch, points: PointCloud, window: int, band: Band, views: ViewBuffers
     ) -> None:
         """Set each pixel's word to the smallest id at its depth. All depths come first."""
-        self._run(_WINNER, batch, points, window, target, band, views)
-
-    def _run(
-        self,
-        step: int,
-        batch: Batch,
-        points: PointCloud,
-        window: int,
-        target: ViewTarget,
-        band: Band,
-        views: ViewBuffers,
-    ) -> None:
-        kernel = self._kernels[step, batch.alpha_mode == "mask"]
-        kernel.set(
-            {
-                **batch.geometry(),
-                **batch.attributes(),
-                **self._scene.materials_of(),
-                "Draws": self._scene.draws,
-                "FrameBlock": target.frame(band, batch),
-                "PointRows": points.rows,
-                "WorkBlock": points.work,
-                "Eyes": target.eyes,
-                **self._projection,
-                "Depths": views.depths,
-                "Words": views.words,
-            },
-            {"window": window},
-            self._scene.samplers(),
-        )
+        kernel = self._kernels[_WINNER, batch.alpha_mode == "mask"]
+        kernel.set(self._buffers(batch, points, band, views), *self._others(window))
         kernel.run_indirect(points.work, window * dtype("Work").itemsize)
+
+    def _others(self, window: int) -> tuple[dict[str, Uniform], Samplers]:
+        return {"window": window}, self._scene.samplers()
+
+    def _buffers(
+        self, batch: Batch, points: PointCloud, band: Band, views: ViewBuffers
+    ) -> dict[str, Buffer]:
+        return {
+            **batch.geometry(),
+            **batch.attributes(),
+            **self._scene.materials_of(),
+            "Draws": self._scene.draws,
+            "FrameBlock": band.frame(batch),
+            "PointRows": points.rows,
+            "WorkBlock": points.work,
+            "Eyes": band.target.eyes,
+            **self._projection,
+            "Depths": views.depths,
+            "Words": views.words,
+        }
 
     def release(self) -> None:
         """Free the kernels."""
-        for owner in (*self._kernels.values(), *self._projection.values()):
-            owner.release()
+        for kernel in self._kernels.values():
+            kernel.release()
+        for buffer in self._projection.values():
+            buffer.release()
 
 
-def pixel_matrices(
-    rig: Rig, grid: ViewGrid
-) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+def pixel_matrices(rig: Rig, grid: ViewGrid) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Each view's display space → (column·w, row·w, 0, w), and how columns are shifted by row.
 
     Returns float32 [view, 16] as GLSL lays a mat4 out, and int32 [row]: a matrix's column less the
@@ -152,11 +134,10 @@ def pixel_matrices(
     offsets = grid.row_offset + shifts
     slope = float(offsets[-1] - offsets[0]) / max(grid.rows - 1, 1)
     start = float(offsets[0]) - 0.5 * slope
-    width, height = rig.panel_mm
     pixel_from_clip = np.zeros((4, 4))
     pixel_from_clip[3, 3] = 1.0
     pixel_from_clip[1, [1, 3]] = -0.5 * grid.rows, 0.5 * grid.rows  # rows run downward
-    window_columns = width / grid.column_mm
+    window_columns = rig.panel_mm[0] / grid.column_mm
     pixel_from_clip[0, [0, 3]] = 0.5 * window_columns, start
     pixel_from_clip[0] += slope * pixel_from_clip[1]
     matrices = pixel_from_clip @ rig.matrices()

@@ -22,12 +22,17 @@ BAND_BYTES = 96 << 20  # of one 32-bit word a view pixel; llvmpipe allows 128 Mi
 MOST_BAND_ROWS = 1000  # with at most 4 Mi triangles a batch, items stay below 2³²
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Band:
-    """Rows [first, first + rows) of the views."""
+    """Rows [first, first + rows) of the views of a target."""
 
+    target: ViewTarget
     first: int
     rows: int
+
+    def frame(self, batch: Batch | None = None) -> Buffer:
+        """The Frame block of this band and a batch; of any, for passes that read no triangles."""
+        return self.target.frame_blocks[self, batch.triangle_base if batch else 0]
 
 
 class ViewTarget:
@@ -39,53 +44,46 @@ class ViewTarget:
         self.rig = rig
         self.grid = grid
         row_bytes = 4 * rig.views * grid.columns
-        band_rows = min(grid.rows, MOST_BAND_ROWS, BAND_BYTES // row_bytes)
-        if band_rows < 1 or max(grid.rows, grid.columns) >= 1 << 16:
+        self.band_rows = min(grid.rows, MOST_BAND_ROWS, BAND_BYTES // row_bytes)
+        if self.band_rows < 1 or max(grid.rows, grid.columns) >= 1 << 16:
             raise ResourceError(
                 f"views: {rig.views} views of {grid.columns}×{grid.rows} do not fit the device; "
                 "use fewer or smaller views"
             )
         self.bands = [
-            Band(first, min(band_rows, grid.rows - first))
-            for first in range(0, grid.rows, band_rows)
+            Band(self, first, min(self.band_rows, grid.rows - first))
+            for first in range(0, grid.rows, self.band_rows)
         ]
-        self.band_pixels = band_rows * rig.views * grid.columns
-        self.eyes = Buffer.of(
-            device, "rig", (rig.eye_x_mm / grid.column_mm).astype(np.float32)
-        )
+        # One row suffices to have a device compile all that a frame will run.
+        self.warm_up_band = Band(self, grid.rows // 2, 1)
+        self.eyes = Buffer.of(device, "rig", (rig.eye_x_mm / grid.column_mm).astype(np.float32))
         self.row_offsets = Buffer.of(device, "rig", grid.row_offset.astype(np.float32))
         self.images = TextureArray(
-            device, "view images", (grid.columns, band_rows, rig.views), gl.RGBA16F
+            device, "view images", (grid.columns, self.band_rows, rig.views), gl.RGBA16F
         )
         self.images.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
-        # One row suffices to have a device compile all that a frame will run.
-        self.warm_up_band = Band(grid.rows // 2, 1)
-        self._frames = {
+        self.frame_blocks = {
             (band, batch.triangle_base): Buffer.of(
-                device, "frame", _frame_record(rig, grid, band, batch, seed)
+                device, "frame", _frame_record(band, batch, seed)
             )
-            for band in {*self.bands, self.warm_up_band}
+            for band in (*self.bands, self.warm_up_band)
             for batch in batches
         }
 
-    def frame(self, band: Band, batch: Batch) -> Buffer:
-        """The Frame block of a band and a batch."""
-        return self._frames[band, batch.triangle_base]
-
-    def band_frame(self, band: Band) -> Buffer:
-        """A Frame block of a band, for passes that read no triangles."""
-        return self._frames[band, 0]
+    @property
+    def band_pixels(self) -> int:
+        """View pixels of the largest band."""
+        return self.band_rows * self.rig.views * self.grid.columns
 
     def release(self) -> None:
         """Free everything."""
-        for buffer in (self.eyes, self.row_offsets, *self._frames.values()):
+        for buffer in (self.eyes, self.row_offsets, *self.frame_blocks.values()):
             buffer.release()
         self.images.release()
 
 
-def _frame_record(
-    rig: Rig, grid: ViewGrid, band: Band, batch: Batch, seed: int
-) -> np.ndarray[tuple[int], np.dtype[np.void]]:
+def _frame_record(band: Band, batch: Batch, seed: int) -> np.ndarray[tuple[int], np.dtype[np.void]]:
+    rig, grid = band.target.rig, band.target.grid
     record = np.zeros(1, dtype("Frame"))
     width, height = rig.panel_mm
     record["distance_mm"] = rig.distance_mm

@@ -12,11 +12,11 @@ from lfd_render.gpu.framebuffer import LayerTarget
 from lfd_render.gpu.memory import TableTexture, TextureArray
 from lfd_render.gpu.programs import Uniform
 from lfd_render.passes.screen import ScreenPass
-from lfd_render.passes.view_target import Band, ViewTarget
+from lfd_render.passes.view_target import Band
 
 
 class Weave:
-    """ViewTarget.images → panel image [y, x, RGBA] in scene-linear half float, row 0 on top.
+    """Band of view images → panel image [y, x, RGBA] in scene-linear half float, row 0 on top.
 
     Each subpixel takes the nearest view at the centre of its lens on its row: the lens's own column
     where views follow the lenses, linear between two columns where they stand upright.
@@ -53,15 +53,15 @@ class Weave:
         self.panel = TextureArray(device, "panel image", (width, height, 1), gl.RGBA16F)
         self.framebuffer = LayerTarget(device, self.panel, depth=False)
 
-    def __call__(self, target: ViewTarget, band: Band) -> None:
+    def __call__(self, band: Band) -> None:
         """Weave the panel rows that show this band."""
         width, height = self._profile.resolution_px
         starts = self._grid.first_panel_rows(height)
         self.framebuffer.use(0)
         self._pass(
-            {"FrameBlock": target.band_frame(band)},
+            {"FrameBlock": band.frame()},
             self._uniforms,
-            {**self._tables, "view_images": target.images},
+            {**self._tables, "view_images": band.target.images},
             (int(starts[band.first]), int(starts[band.first + band.rows])),
             width,
         )
@@ -80,19 +80,17 @@ class Weave:
         self._pass.release()
 
 
-def lens_columns(
-    profile: DisplayProfile, grid: ViewGrid
-) -> tuple[float, NDArray[np.float64]]:
+def lens_columns(profile: DisplayProfile, grid: ViewGrid) -> tuple[float, NDArray[np.float64]]:
     """Where lens k appears in a view: column position = k·columns_per_lens + row_columns[panel y].
 
-    Returns columns_per_lens and row_columns, float64 [panel height]. Lens-aligned: lens k is column
-    k − row_base. Upright: the lens centre at u = (k + ½ + center)/P − v·T (displays, section 1).
+    Returns columns_per_lens and row_columns, float64 [panel height]. Lens-aligned: lens k is
+    column k − row_base. Upright: the lens centre at u = (k + ½ + center)/P − v·T.
     """
     height = profile.resolution_px[1]
     y = np.arange(height)
     if grid.kind == "lens":
         view_row = np.minimum((2 * y + 1) * grid.rows // (2 * height), grid.rows - 1)
-        return 1.0, 0.5 - grid.row_base[view_row]
+        return 1.0, 0.5 - grid.row_base[view_row].astype(np.float64)
     v = (height - y - 0.5) / height
     count = profile.lens_count
     offsets = (0.5 + profile.center) / count - v * profile.drift
@@ -100,15 +98,13 @@ def lens_columns(
 
 
 def phase_words(phases: NDArray[np.float64], views: int) -> NDArray[np.uint32]:
-    """Phases in lenses → [..., 2] words: whole views (two's complement) and 2⁻³² fractions of one."""
+    """Phases in lenses → [..., 2] words: whole views (signed) and 2⁻³² fractions of one."""
     in_views = phases * views
     whole = np.floor(in_views)
     fraction = np.rint((in_views - whole) * 2.0**32).astype(np.uint64)
     carry = fraction >> np.uint64(32)
     whole_words = (whole.astype(np.int64) + carry.astype(np.int64)).astype(np.int32)
-    return np.stack(
-        [whole_words.view(np.uint32), fraction.astype(np.uint32)], axis=-1
-    )
+    return np.stack([whole_words.view(np.uint32), fraction.astype(np.uint32)], axis=-1)
 
 
 def _table(

@@ -1,7 +1,7 @@
 """Techniques: each a list of passes."""
 
-from .base import Placement, Technique
-from .lfdpr import Lfdpr
-from .mvr import Mvr
+from lfd_render.techniques.base import Technique
+from lfd_render.techniques.lfdpr import Lfdpr
+from lfd_render.techniques.mvr import Mvr
 
-__all__ = ["Lfdpr", "Mvr", "Placement", "Technique"]
+__all__ = ["Lfdpr", "Mvr", "Technique"]

@@ -2,27 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lfd_render.gpu.clock import StageClock
+from lfd_render.passes.placement import Placement
 from lfd_render.passes.view_target import Band, ViewTarget
-
-
-@dataclass(frozen=True)
-class Placement:
-    """One frame's camera. display_from_world: float64 [4, 4]; background: linear RGB."""
-
-    display_from_world: NDArray[np.float64]
-    background: tuple[float, float, float]
-
-    @property
-    def world_from_display(self) -> NDArray[np.float64]:
-        """The inverse, float64 [4, 4]."""
-        return np.linalg.inv(self.display_from_world)
 
 
 class Technique(Protocol):

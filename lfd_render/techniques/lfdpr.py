@@ -5,12 +5,12 @@ from __future__ import annotations
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
+from lfd_render.passes.placement import Placement
 from lfd_render.passes.sample import PointCloud, Sample
 from lfd_render.passes.shade import Shade
 from lfd_render.passes.splat import Splat, ViewBuffers, view_lanes
 from lfd_render.passes.transform import Transform
 from lfd_render.passes.view_target import Band, ViewTarget
-from lfd_render.techniques.base import Placement
 
 
 class Lfdpr:
@@ -54,58 +54,47 @@ class Lfdpr:
         self.render(self.target.warm_up_band, clock)
         for band in self.target.bands:
             for batch, points in self._batches():
-                self._sample(batch, self.target, band, points)
+                self._sample(batch, points, band)
         self.complete()
 
     def render(self, band: Band, clock: StageClock) -> None:
         """Sample, splat and shade one band of rows."""
         with clock.stage("sample"):
             for batch, points in self._batches():
-                self._sample(batch, self.target, band, points)
-                self._sample.rows(batch, self.target, band, points, 0)
-        placement = self._placement
+                self._sample(batch, points, band)
+                self._sample.rows(batch, points, band, 0)
         solid = [pair for pair in self._batches() if pair[0].alpha_mode != "blend"]
         with clock.stage("splat"):
             self._views.clear()
             self._find_winners(solid, band)
         with clock.stage("shade"):
-            self._shade.opaque(
-                self.target,
-                band,
-                self._views,
-                [batch for batch, _ in solid],
-                placement.world_from_display,
-                placement.background,
-            )
+            batches = [batch for batch, _ in solid]
+            self._shade.opaque(batches, band, self._views, self._placement)
         blended = [pair for pair in self._batches() if pair[0].alpha_mode == "blend"]
         if blended:
             with clock.stage("blend"):
                 self._views.clear_words()
                 self._find_winners(blended, band)
-                self._shade.blend(
-                    self.target,
-                    band,
-                    self._views,
-                    [batch for batch, _ in blended],
-                    placement.world_from_display,
-                )
+                batches = [batch for batch, _ in blended]
+                self._shade.blend(batches, band, self._views, self._placement)
 
     def _find_winners(self, batches: list[tuple[Batch, PointCloud]], band: Band) -> None:
         for splat in (self._splat.depths, self._splat.winners):
             for batch, points in batches:
                 for window in range(points.windows):
                     if points.windows > 1:
-                        self._sample.rows(batch, self.target, band, points, window)
-                    splat(batch, points, window, self.target, band, self._views)
+                        self._sample.rows(batch, points, band, window)
+                    splat(batch, points, window, band, self._views)
 
     def complete(self) -> bool:
         """Whether the windows held all points since the last call; if not, they do from now on."""
-        return not any([self._sample.fit(points) for points in self._points])
+        enlarged = [self._sample.fit(points) for points in self._points]
+        return not any(enlarged)
 
     def count_points(self) -> int:
         """Points of all bands at the last placement. Samples again, outside any timing."""
         return sum(
-            self._sample.count(batch, self.target, band, points)
+            self._sample.count(batch, points, band)
             for band in self.target.bands
             for batch, points in self._batches()
         )
@@ -115,8 +104,11 @@ class Lfdpr:
 
     def release(self) -> None:
         """Free passes, points and view buffers."""
-        for owner in (
-            self._transform, self._sample, self._splat, self._shade, self._views, self.target,
-            *self._points,
-        ):  # fmt: skip
-            owner.release()
+        for points in self._points:
+            points.release()
+        self._transform.release()
+        self._sample.release()
+        self._splat.release()
+        self._shade.release()
+        self._views.release()
+        self.target.release()

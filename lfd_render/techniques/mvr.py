@@ -5,10 +5,10 @@ from __future__ import annotations
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.scene_buffers import SceneBuffers
+from lfd_render.passes.placement import Placement
 from lfd_render.passes.raster import RasterForward
 from lfd_render.passes.transform import Transform
 from lfd_render.passes.view_target import Band, ViewTarget
-from lfd_render.techniques.base import Placement
 
 
 class Mvr:
@@ -39,8 +39,7 @@ class Mvr:
                 self._rasterise(view, band)
 
     def _rasterise(self, view: int, band: Band) -> None:
-        placement = self._placement
-        self._raster(view, band, placement.world_from_display, placement.background)
+        self._raster(view, band, self._placement)
 
     def complete(self) -> bool:
         """Rasterisation needs no room."""

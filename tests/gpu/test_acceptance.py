@@ -13,11 +13,12 @@ from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.scene_buffers import SceneBuffers
 from lfd_render.panel.look import look
+from lfd_render.passes.placement import Placement
 from lfd_render.passes.view_target import ViewTarget
 from lfd_render.quality import ssim_luma
 from lfd_render.renderer import Renderer
 from lfd_render.scene import Instance, Material, Mesh, Scene
-from lfd_render.techniques import Lfdpr, Placement
+from lfd_render.techniques import Lfdpr
 
 pytestmark = pytest.mark.needs("gl")
 
@@ -40,15 +41,15 @@ def millimetre_camera(display: DisplayProfile) -> Camera:
     return Camera((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), display.size_mm[1])
 
 
-def unlit_scene(*surfaces: tuple[NDArray[np.float64], NDArray[np.int64], tuple[float, ...]]) -> Scene:
+def unlit_scene(
+    *surfaces: tuple[NDArray[np.float64], NDArray[np.int64], tuple[float, ...]],
+) -> Scene:
     """Surfaces of one colour each: positions [n, 3] in mm, triangles [m, 3], linear RGB."""
     meshes, materials = [], []
     for index, (positions, triangles, color) in enumerate(surfaces):
         count = len(positions)
         materials.append(
-            Material(
-                f"flat {index}", base_color=(*color, 1.0), unlit=True, double_sided=True
-            )  # type: ignore[arg-type]  # a colour has three numbers
+            Material(f"flat {index}", base_color=(*color, 1.0), unlit=True, double_sided=True)  # type: ignore[arg-type]  # a colour has three numbers
         )
         meshes.append(
             Mesh(
@@ -239,7 +240,9 @@ def test_closed_surfaces_have_no_holes(
         behind = rectangle((-1e5, 1e5), (-1e5, 1e5), -2000.0)
         scene = unlit_scene((*front, (1, 1, 1)), (*behind, (1, 0, 0)))
         words, depths = winners(device, scene, display, rig, grid, general=general)
-        assert np.count_nonzero(words >= len(front[1])) == 0  # neither background nor what is behind
+        assert (
+            np.count_nonzero(words >= len(front[1])) == 0
+        )  # neither background nor what is behind
         farthest = rig.distance_mm - (centre[2] - amplitude)
         assert depths.max() <= farthest * (1 + 1e-4)
 
@@ -250,9 +253,7 @@ def test_a_missing_triangle_is_seen_as_a_hole(device: Device, display: DisplayPr
     broken = np.delete(front[1], len(front[1]) // 2, axis=0)
     behind = rectangle((-1e5, 1e5), (-1e5, 1e5), -2000.0)
     scene = unlit_scene((front[0], broken, (1, 1, 1)), (*behind, (1, 0, 0)))
-    words, _ = winners(
-        device, scene, display, display.rig(2), ViewGrid.upright(display, 480, 270)
-    )
+    words, _ = winners(device, scene, display, display.rig(2), ViewGrid.upright(display, 480, 270))
     assert np.count_nonzero(words >= len(broken)) > 0
 
 
@@ -276,8 +277,8 @@ def test_a_ground_that_runs_under_the_viewer_is_whole(
     words, depths = winners(
         device, unlit_scene((*ground, (1, 1, 1))), display, rig, grid, general=general
     )
-    # The ray to window point (x, y) meets Y = −40 + tilt·X where t·(y − tilt·(x − s)) = tilt·s − 40,
-    # with t the part of the way to the window.
+    # With t the part of its way to the window, the ray to window point (x, y) meets Y = −40 + tilt·X
+    # where t·(y − tilt·(x − s)) = tilt·s − 40.
     x = (np.arange(480) + 0.5) / 480 * display.size_mm[0] - display.size_mm[0] / 2
     y = grid.row_mm()[:, None, None]
     s = rig.eye_x_mm[None, :, None]

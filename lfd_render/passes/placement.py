@@ -1,0 +1,28 @@
+"""One frame's camera, as passes need it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where the window stands in a frame. display_from_world: float64 [4, 4]; background: linear
+    RGB."""
+
+    display_from_world: NDArray[np.float64]
+    background: tuple[float, float, float]
+
+    @cached_property
+    def world_from_display(self) -> NDArray[np.float64]:
+        """The inverse, float64 [4, 4]."""
+        return np.linalg.inv(self.display_from_world).astype(np.float64)
+
+
+def gl_matrix(matrix: NDArray[np.float64]) -> bytes:
+    """A [4, 4] matrix of column vectors as a mat4 uniform: float32, column by column."""
+    return matrix.T.astype(np.float32).tobytes()
