@@ -6,12 +6,13 @@ meaning if not in execution. Nothing here knows of buffers, passes or shaders.
 
 from .encode import encoded
 from .pipeline import Views, render_eia, render_views
-from .raster import NO_TRIANGLE, Visibility, visible
+from .raster import NO_TRIANGLE, Pixels, Visibility, visible
 from .transform import Triangles, placed
 from .weave import woven
 
 __all__ = [
     "NO_TRIANGLE",
+    "Pixels",
     "Triangles",
     "Views",
     "Visibility",

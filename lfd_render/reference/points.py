@@ -1,10 +1,10 @@
 """The row lattice: which points a triangle is sampled by, and which pixels each of them fills.
 
-All eyes stand at the height of the window's middle, so the plane through them and the centre line of
-a window row is the same for every view, and cuts a triangle in one segment, its slice. Points lie
-along slices: cells of one length, in columns of the eye that sees the triangle's plane densest.
-The length follows from the texture-based limit, equations 1–3 of Gavane and Watson 2024
-(section 3.1), applied along the row only, because rows are shared by all views.
+All eyes stand at the height of the window's middle, so the plane through them and the centre line
+of a window row is the same for every view, and cuts a triangle in one segment, its slice. Points
+lie along slices: cells of one length, in columns of the eye that sees the triangle's plane densest.
+The length follows from the texture-based limit, equations 1–3 of Gavane and Watson 2024 (section
+3.1), applied along the row only, because rows are shared by all views.
 """
 
 from __future__ import annotations
@@ -53,33 +53,27 @@ def point_rows(scene: Scene, triangles: Triangles, rig: Rig, grid: ViewGrid) -> 
         if not faces(-sides, triangles.mirrored[index], triangles.double_sided[index]).any():
             continue
         densest = densest_view(corners, rig)
-        length = point_columns(scene, triangles, index, rig, grid)
+        cell = point_columns(scene, triangles, index, rig, grid)
         for row in range(grid.rows):
             ends_mm = slice_mm(corners, rig, grid, row)
-            if ends_mm is not None:
-                found.append(_points(index, row, ends_mm, densest, length, rig, grid))
+            if ends_mm is None:
+                continue
+            columns = columns_of(ends_mm, rig, grid, row, densest)
+            order = np.argsort(columns, kind="stable")
+            ends_mm, columns = ends_mm[order], columns[order]
+            first, count = cells_of(columns, cell)
+            found.append(PointRow(index, row, ends_mm, densest, columns, cell, first, count))
     return found
 
 
-def _points(
-    triangle: int,
-    row: int,
-    ends_mm: Float64,
-    densest: int,
-    cell: float,
-    rig: Rig,
-    grid: ViewGrid,
-) -> PointRow:
-    columns = columns_of(ends_mm, rig, grid, row, densest)
-    order = np.argsort(columns, kind="stable")
-    columns = columns[order]
+def cells_of(columns: Float64, cell: float) -> tuple[int, int]:
+    """First index and number of the half-open cells that an interval [2] of columns touches."""
     first = int(np.floor(columns[0] / cell))
-    count = max(1, int(np.ceil(columns[1] / cell)) - first)  # one touched at a bare point is one
-    return PointRow(triangle, row, ends_mm[order], densest, columns, cell, first, count)
+    return first, max(1, int(np.ceil(columns[1] / cell)) - first)
 
 
 def columns_of(p_display: Float64, rig: Rig, grid: ViewGrid, row: int, view: int) -> Float64:
-    """Where points [n, 3] on a row's plane appear in a view: the shear k·X + (1 − k)·s, in columns."""
+    """Columns at which points [n, 3] on a row's plane appear in a view: x = k·X + (1 − k)·s."""
     k = rig.distance_mm / (rig.distance_mm - p_display[:, 2])
     x_mm = k * p_display[:, 0] + (1.0 - k) * rig.eye_x_mm[view]
     columns: Float64 = x_mm / grid.column_mm + grid.row_offset[row]
@@ -136,7 +130,7 @@ def _between(at_p: Float64, at_q: Float64) -> tuple[float, float]:
 
 
 def eye_sides(corners: Float64, rig: Rig) -> Float64:
-    """normal·(E − A) of each eye, [view]: mm³, positive in front of a counter-clockwise triangle."""
+    """normal·(E − A) of each eye, mm³ [view]: positive where corners run counter-clockwise."""
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     eyes = np.zeros((rig.views, 3))
     eyes[:, 0], eyes[:, 2] = rig.eye_x_mm, rig.distance_mm
@@ -198,7 +192,7 @@ def most_texels(scene: Scene, material: Material, texcoords: Float64) -> float:
 
 
 def footprints(points: PointRow, rig: Rig, grid: ViewGrid, view: int) -> list[tuple[int, int]]:
-    """Columns [begin, end) of a view's row that each point fills: those whose centre its cell holds.
+    """Columns [begin, end) of a view's row that each point fills: their centres lie in its cell.
 
     A cell's boundary stands still on the surface, so other views see it where the shear puts it.
     """

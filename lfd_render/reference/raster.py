@@ -27,16 +27,37 @@ Int = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 NO_TRIANGLE = 0xFFFFFFFF  # id of a pixel that shows the background
 
-# Whether a triangle is opaque at pixels: id, then row, view and column of each pixel.
-Accepts = Callable[[int, Int, Int, Int], Bool]
+
+@dataclass(frozen=True, eq=False)
+class Pixels:
+    """View pixels, by arrays that broadcast together. Row 0 is the top one, view 0 the leftmost."""
+
+    row: Int
+    view: Int
+    column: Int
+
+    def __getitem__(self, chosen: Bool | Int) -> Pixels:
+        return Pixels(self.row[chosen], self.view[chosen], self.column[chosen])
+
+
+# Whether a triangle is opaque at pixels.
+Accepts = Callable[[int, Pixels], Bool]
 
 
 @dataclass(frozen=True, eq=False)
 class Visibility:
-    """ids: uint32 [row, view, column]; depths: float64 alike, distance D − Z in mm, ∞ where nothing."""
+    """What each view pixel shows, [row, view, column].
+
+    ids: uint32, NO_TRIANGLE for the background; depths: float64, D − Z in mm, ∞ there.
+    """
 
     ids: NDArray[np.uint32]
     depths: Float64
+
+    def shown(self) -> tuple[Pixels, Int]:
+        """The pixels [n] that show a triangle, and which."""
+        at = np.nonzero(self.ids != NO_TRIANGLE)
+        return Pixels(*at), self.ids[at].astype(np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,12 +69,11 @@ class Rays:
     y_mm: Float64
 
 
-def rays(rig: Rig, grid: ViewGrid, row: Int, view: Int, column: Int) -> Rays:
-    """Rays through the centres of pixels; row, view and column broadcast together."""
-    x_mm = (column + 0.5 - grid.row_offset[row]) * grid.column_mm
-    row_mm = grid.panel_mm[1] / grid.rows
-    y_mm = 0.5 * grid.panel_mm[1] - (row + 0.5) * row_mm
-    return Rays(rig.eye_x_mm[view], x_mm, y_mm)
+def rays(rig: Rig, grid: ViewGrid, pixels: Pixels) -> Rays:
+    """Rays through the centres of pixels."""
+    x_mm = (pixels.column + 0.5 - grid.row_offset[pixels.row]) * grid.column_mm
+    y_mm = grid.panel_mm[1] * (0.5 - (pixels.row + 0.5) / grid.rows)
+    return Rays(rig.eye_x_mm[pixels.view], x_mm, np.asarray(y_mm))
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +146,7 @@ def visible(
     accepts: which pixels a triangle is opaque at, everywhere by default. Triangles and their parts
     closer to the eyes than rig.near_mm are not seen.
     """
-    row, view, column = np.ogrid[: grid.rows, : rig.views, : grid.columns]
-    through = rays(rig, grid, row, view, column)
+    through = rays(rig, grid, Pixels(*np.ogrid[: grid.rows, : rig.views, : grid.columns]))
     ids = np.full((grid.rows, rig.views, grid.columns), NO_TRIANGLE, np.uint32)
     depths = np.full(ids.shape, np.inf)
     for index in range(len(triangles)):
@@ -136,7 +155,7 @@ def visible(
         found &= meeting.depths < depths  # an equal depth keeps the smaller id
         if accepts is not None and found.any():
             at = np.nonzero(found)
-            found[at] = accepts(index, *at)
+            found[at] = accepts(index, Pixels(*at))
         ids[found] = index
         depths[found] = meeting.depths[found]
     return Visibility(ids, depths)
@@ -151,11 +170,11 @@ def covers(meeting: Meeting, triangles: Triangles, index: int | Int, near_mm: fl
 
 
 def boundary_distance(
-    corners: Float64, rig: Rig, grid: ViewGrid, row: Int, view: Int, column: Int
+    corners: Float64, rig: Rig, grid: ViewGrid, pixels: Pixels
 ) -> tuple[Float64, Float64]:
     """Distance of pixel centres from each edge of a triangle's picture, in pixels.
 
-    corners: [3, 3] mm; row, view, column: [pixel]. The triangle is first cut at the near plane,
+    corners: [3, 3] mm; pixels: [pixel]. The triangle is first cut at the near plane,
     whose cut is an edge too. Returns distances [pixel, edge], in which a column and a row both
     count as 1, and k = D/d at the edge's nearest point, [pixel, edge]. A triangle that lies wholly
     before the near plane has no edges.
@@ -163,11 +182,14 @@ def boundary_distance(
     polygon = near_part(corners, rig.distance_mm - rig.near_mm)
     k = rig.distance_mm / (rig.distance_mm - polygon[:, 2])
     row_mm = grid.panel_mm[1] / grid.rows
-    eye = rig.eye_x_mm[view][:, None]
-    x_px = (k * polygon[:, 0] + (1.0 - k) * eye) / grid.column_mm  # columns from the window's middle
+    eye = rig.eye_x_mm[pixels.view][:, None]
+    x_px = (
+        k * polygon[:, 0] + (1.0 - k) * eye
+    ) / grid.column_mm  # columns from the window's middle
     y_px = np.broadcast_to((0.5 * grid.panel_mm[1] - k * polygon[:, 1]) / row_mm, x_px.shape)
     corner_px = np.stack([x_px, y_px], axis=-1)  # [pixel, corner, xy]
-    centre_px = np.stack([column + 0.5 - grid.row_offset[row], row + 0.5], axis=-1)[:, None, :]
+    centre_column = pixels.column + 0.5 - grid.row_offset[pixels.row]
+    centre_px = np.stack([centre_column, pixels.row + 0.5], axis=-1)[:, None, :]
 
     along = np.roll(corner_px, -1, axis=1) - corner_px
     length2 = np.sum(along * along, axis=-1)

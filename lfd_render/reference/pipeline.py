@@ -1,0 +1,82 @@
+"""The whole way: scene → views → panel image, each step by its definition."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lfd_render.display import Camera, DisplayProfile, Rig, ViewGrid
+from lfd_render.reference.encode import encoded
+from lfd_render.reference.raster import Visibility, visible
+from lfd_render.reference.shade import Shading, opaque_at, points_at
+from lfd_render.reference.transform import placed
+from lfd_render.reference.weave import woven
+from lfd_render.scene import Scene
+
+Float64 = NDArray[np.float64]
+Color = tuple[float, float, float]
+BLACK: Color = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """linear: float64 [view, row, column, rgb]; visibility: what each pixel shows."""
+
+    linear: Float64
+    visibility: Visibility
+
+
+def render_views(
+    scene: Scene,
+    rig: Rig,
+    grid: ViewGrid,
+    display_from_world: Float64,
+    *,
+    background: Color = BLACK,
+    seed: int = 0,
+) -> Views:
+    """All views of a scene. display_from_world: float64 [4, 4], as `Camera.display_from_world`."""
+    triangles = placed(scene, display_from_world)
+    shading = Shading(scene, triangles, np.linalg.inv(display_from_world).astype(np.float64))
+    visibility = visible(triangles, rig, grid, opaque_at(shading, rig, grid, seed))
+    linear = shaded(shading, visibility, rig, grid, background)
+    return Views(linear, visibility)
+
+
+def shaded(
+    shading: Shading,
+    visibility: Visibility,
+    rig: Rig,
+    grid: ViewGrid,
+    background: Color = BLACK,
+) -> Float64:
+    """View images [view, row, column, rgb] of what each pixel shows."""
+    linear = np.empty((rig.views, grid.rows, grid.columns, 3))
+    linear[...] = background
+    pixels, ids = visibility.shown()
+    points = points_at(shading.triangles, rig, grid, ids, pixels)
+    colors = shading.colors(points, rig.eye_x_mm[pixels.view], rig.distance_mm)
+    linear[pixels.view, pixels.row, pixels.column] = colors
+    return linear
+
+
+def render_eia(
+    scene: Scene,
+    profile: DisplayProfile,
+    camera: Camera,
+    *,
+    rig: Rig | None = None,
+    grid: ViewGrid | None = None,
+    background: Color = BLACK,
+    exposure: float = 1.0,
+    seed: int = 0,
+) -> NDArray[np.uint8]:
+    """The panel image, uint8 [y, x, rgb]; by default with the profile's views along its lenses."""
+    rig = profile.rig() if rig is None else rig
+    if grid is None:
+        grid = ViewGrid.lens(profile, ViewGrid.default_rows(profile, rig.views))
+    display_from_world = camera.display_from_world(profile.size_mm)
+    views = render_views(scene, rig, grid, display_from_world, background=background, seed=seed)
+    return encoded(woven(views.linear, profile, grid), exposure)

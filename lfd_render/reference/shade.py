@@ -1,0 +1,303 @@
+"""The colour of a view pixel: where its ray meets the triangle, glTF metallic-roughness there.
+
+glTF 2.0 specification, appendix B (BRDF implementation), under the studio's light. Derivatives are
+those of the barycentric weights: with α, β, γ linear in the window point (see `raster`), the weight
+of a corner is α/(α + β + γ), and its derivative follows by the quotient rule.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lfd_render.display import Rig, ViewGrid
+from lfd_render.reference import studio
+from lfd_render.reference.coverage import accepted
+from lfd_render.reference.raster import Accepts, Pixels, faces, meet, rays
+from lfd_render.reference.textures import area_lod, mip_chain, sampled
+from lfd_render.reference.transform import Triangles, points_by, unit
+from lfd_render.scene import Material, Scene
+
+Float64 = NDArray[np.float64]
+Int = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+SMALLEST_ALPHA = 0.002  # GGX α of the smoothest surface, which keeps its highlight finite
+SRGB_ROLES = ("base_color_texture", "emissive_texture")
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Where rays meet their triangles, [pixel, …]; dx is over a column, dy over a row downward."""
+
+    ids: Int
+    weights: Float64  # [pixel, corner]
+    weights_dx: Float64
+    weights_dy: Float64
+    p_display: Float64  # [pixel, xyz]
+    p_display_dx: Float64
+    p_display_dy: Float64
+    back: Bool  # seen from behind
+
+    def blend(self, at_corners: Float64) -> Float64:
+        """Values of the pixels' own corners [pixel, corner, …], at the pixels."""
+        blended: Float64 = np.einsum("nc,nc...->n...", self.weights, at_corners)
+        return blended
+
+
+def points_at(triangles: Triangles, rig: Rig, grid: ViewGrid, ids: Int, pixels: Pixels) -> Points:
+    """Points of pixels [pixel] on the triangles that ids [pixel] name."""
+    corners = triangles.p_display[ids]
+    meeting = meet(corners, rays(rig, grid, pixels), rig.distance_mm)
+    whole = meeting.volumes.sum(axis=-1, keepdims=True)
+    weights = meeting.weights
+    # Volumes grow with the window point by their normals; a row leads downward.
+    by_x = meeting.normals[..., 0] * grid.column_mm
+    by_y = -meeting.normals[..., 1] * grid.panel_mm[1] / grid.rows
+    weights_dx = (by_x - weights * by_x.sum(axis=-1, keepdims=True)) / whole
+    weights_dy = (by_y - weights * by_y.sum(axis=-1, keepdims=True)) / whole
+    p_display, p_dx, p_dy = (
+        np.einsum("nc,ncx->nx", w, corners) for w in (weights, weights_dx, weights_dy)
+    )
+    back = ~faces(meeting.whole, triangles.mirrored[ids], double_sided=False)
+    return Points(ids, weights, weights_dx, weights_dy, p_display, p_dx, p_dy, back)
+
+
+class Shading:
+    """Materials of a scene, ready to colour points. Mip chains are made once an image."""
+
+    def __init__(self, scene: Scene, triangles: Triangles, world_from_display: Float64) -> None:
+        self.scene = scene
+        self.triangles = triangles
+        self.world_from_display = world_from_display
+        self._chains: dict[tuple[int, bool], list[Float64]] = {}
+
+    def colors(self, points: Points, eyes_mm: Float64, distance_mm: float) -> Float64:
+        """Scene-linear light [pixel, rgb] that points send to eyes at (eyes_mm, 0, distance_mm)."""
+        eye_display = np.stack(
+            [eyes_mm, np.zeros_like(eyes_mm), np.full_like(eyes_mm, distance_mm)], axis=-1
+        )
+        eye_world = points_by(self.world_from_display, eye_display)
+        colors = np.zeros((len(points.ids), 3))
+        for index in np.unique(self.triangles.material[points.ids]):
+            chosen = self.triangles.material[points.ids] == index
+            part = Points(**{name: field[chosen] for name, field in vars(points).items()})
+            surface = Surface(self, self.scene.materials[index], part)
+            colors[chosen] = surface.radiance(eye_world[chosen])
+        return colors
+
+    def alpha(self, points: Points) -> Float64:
+        """Opacity [pixel]: base colour, its texture and the vertices' colours."""
+        alpha = np.zeros(len(points.ids))
+        for index in np.unique(self.triangles.material[points.ids]):
+            chosen = self.triangles.material[points.ids] == index
+            part = Points(**{name: field[chosen] for name, field in vars(points).items()})
+            alpha[chosen] = Surface(self, self.scene.materials[index], part).base_color[:, 3]
+        return alpha
+
+    def chain(self, image: int, *, srgb: bool) -> list[Float64]:
+        """Mip chain of an image."""
+        if (image, srgb) not in self._chains:
+            pixels = self.scene.images[image].pixels
+            self._chains[image, srgb] = mip_chain(pixels, srgb=srgb)
+        return self._chains[image, srgb]
+
+
+class Surface:
+    """Points on one material."""
+
+    def __init__(self, shading: Shading, material: Material, points: Points) -> None:
+        self._shading = shading
+        self._material = material
+        self._points = points
+
+    def texture(self, role: str) -> Float64 | None:
+        """Filtered texels [pixel, rgba] of a slot, in linear light, or None without a texture."""
+        slot = getattr(self._material, role)
+        if slot is None:
+            return None
+        uv, uv_dx, uv_dy = self.texcoord(role)
+        chain = self._shading.chain(slot.image, srgb=role in SRGB_ROLES)
+        height, width = chain[0].shape[:2]
+        return sampled(chain, uv, area_lod(uv_dx, uv_dy, (width, height)), slot.wrap)
+
+    def texcoord(self, role: str) -> tuple[Float64, Float64, Float64]:
+        """A slot's texture coordinate [pixel, uv] and its change over a column and a row.
+
+        KHR_texture_transform: the slot's matrix applies to (u, v, 1).
+        """
+        slot = getattr(self._material, role)
+        points = self._points
+        corners = self._shading.triangles.texcoords[points.ids][:, :, slot.texcoord]
+        matrix = np.eye(3) if slot.uv_transform is None else slot.uv_transform
+        corners = corners @ matrix[:2, :2].T + matrix[:2, 2]
+        uv, uv_dx, uv_dy = (
+            np.einsum("nc,ncu->nu", weights, corners)
+            for weights in (points.weights, points.weights_dx, points.weights_dy)
+        )
+        return uv, uv_dx, uv_dy
+
+    @cached_property
+    def base_color(self) -> Float64:
+        """Linear RGBA [pixel, 4]: factor, vertex colour and texture multiplied."""
+        color = self._points.blend(self._shading.triangles.colors[self._points.ids])
+        color = color * np.array(self._material.base_color)
+        texels = self.texture("base_color_texture")
+        return color if texels is None else np.asarray(color * texels)
+
+    @cached_property
+    def normal(self) -> Float64:
+        """Unit normals [pixel, xyz] in the world, normal map included, toward the side seen."""
+        corners = self._shading.triangles.normals_world[self._points.ids]
+        normal = unit(self._points.blend(corners))
+        normal = self._mapped(normal)
+        return np.where(self._points.back[:, None], -normal, normal)
+
+    def _mapped(self, normal: Float64) -> Float64:
+        """Normals turned by the normal map (glTF 3.9.3): red along +u, green against +v.
+
+        The directions of u and v on the surface come from the gradients of position and texture
+        coordinate, made square to the normal. Where texture coordinates stand still there are none.
+        """
+        slot, texels = self._material.normal_texture, self.texture("normal_texture")
+        if slot is None or texels is None:
+            return normal
+        _, uv_dx, uv_dy = self.texcoord("normal_texture")
+        turn = self._shading.world_from_display[:3, :3].T
+        p_dx, p_dy = self._points.p_display_dx @ turn, self._points.p_display_dy @ turn
+        # Solve dp = p_u·du + p_v·dv over the column step and the row step.
+        determinant = uv_dx[:, 0] * uv_dy[:, 1] - uv_dx[:, 1] * uv_dy[:, 0]
+        flip = np.sign(determinant)[:, None]
+        along_u = (p_dx * uv_dy[:, 1:] - p_dy * uv_dx[:, 1:]) * flip
+        along_v = (p_dy * uv_dx[:, :1] - p_dx * uv_dy[:, :1]) * flip
+        tangent = unit(along_u - normal * _dot(normal, along_u)[:, None])
+        bitangent = -unit(along_v - normal * _dot(normal, along_v)[:, None])
+        map_normal = 2.0 * texels[:, :3] - 1.0
+        map_normal[:, :2] *= slot.scale
+        turned = unit(
+            map_normal[:, :1] * tangent
+            + map_normal[:, 1:2] * bitangent
+            + map_normal[:, 2:] * normal
+        )
+        without = (np.sum(tangent**2, axis=1) == 0.0) | (np.sum(bitangent**2, axis=1) == 0.0)
+        return np.where(without[:, None], normal, turned)
+
+    @cached_property
+    def occlusion(self) -> Float64:
+        """Share of the studio's light that arrives, [pixel]: the map's red by the strength."""
+        slot, texels = self._material.occlusion_texture, self.texture("occlusion_texture")
+        if slot is None or texels is None:
+            return np.ones(len(self._points.ids))
+        return 1.0 + slot.scale * (texels[:, 0] - 1.0)
+
+    @cached_property
+    def metallic_roughness(self) -> tuple[Float64, Float64]:
+        """Metallic and roughness, [pixel] each: factors times the map's blue and green."""
+        texels = self.texture("metallic_roughness_texture")
+        ones = np.ones(len(self._points.ids))
+        blue, green = (ones, ones) if texels is None else (texels[:, 2], texels[:, 1])
+        return self._material.metallic * blue, self._material.roughness * green
+
+    @cached_property
+    def emitted(self) -> Float64:
+        """Light that the surface sends out by itself, [pixel, rgb]."""
+        texels = self.texture("emissive_texture")
+        factor = np.tile(self._material.emissive, (len(self._points.ids), 1))
+        return factor if texels is None else np.asarray(factor * texels[:, :3])
+
+    def radiance(self, eye_world: Float64) -> Float64:
+        """Scene-linear light [pixel, rgb] toward eyes [pixel, xyz]; the base colour when unlit."""
+        base_color = self.base_color[:, :3]
+        if self._material.unlit:
+            return base_color
+        metallic, roughness = self.metallic_roughness
+        p_world = points_by(self._shading.world_from_display, self._points.p_display)
+        toward_eye = unit(eye_world - p_world)
+        # glTF B.3.5: dielectrics reflect 4 %, metals their base colour and scatter nothing.
+        f0 = 0.04 + (base_color - 0.04) * metallic[:, None]
+        albedo = base_color * (1.0 - metallic)[:, None]
+        light = self.occlusion[:, None] * (
+            albedo * studio.diffuse(self.normal) + self._mirrored(f0, roughness, toward_eye)
+        )
+        return light + self._key_light(f0, albedo, roughness, toward_eye) + self.emitted
+
+    def _mirrored(self, f0: Float64, roughness: Float64, toward_eye: Float64) -> Float64:
+        """The studio seen in the surface: its blurred light by the environment BRDF."""
+        normal = self.normal
+        n_dot_v = _eye_cosine(normal, toward_eye)
+        reflected = 2.0 * _dot(normal, toward_eye)[:, None] * normal - toward_eye
+        scale, bias = environment_brdf(roughness, n_dot_v)
+        return (f0 * scale[:, None] + bias[:, None]) * studio.radiance(reflected, roughness)
+
+    def _key_light(
+        self, f0: Float64, albedo: Float64, roughness: Float64, toward_eye: Float64
+    ) -> Float64:
+        """Light of the key, diffuse (albedo/π) and specular."""
+        n_dot_l = np.maximum(0.0, self.normal @ studio.KEY_DIRECTION)
+        halfway = unit(toward_eye + studio.KEY_DIRECTION)
+        specular = specular_brdf(
+            f0,
+            np.maximum(SMALLEST_ALPHA, roughness**2),
+            n_dot_l=n_dot_l,
+            n_dot_v=_eye_cosine(self.normal, toward_eye),
+            n_dot_h=np.clip(_dot(self.normal, halfway), 0.0, 1.0),
+            v_dot_h=np.clip(_dot(toward_eye, halfway), 0.0, 1.0),
+        )
+        lit: Float64 = studio.KEY_IRRADIANCE * n_dot_l[:, None] * (albedo / np.pi + specular)
+        return lit
+
+
+def specular_brdf(
+    f0: Float64,
+    alpha: Float64,
+    *,
+    n_dot_l: Float64,
+    n_dot_v: Float64,
+    n_dot_h: Float64,
+    v_dot_h: Float64,
+) -> Float64:
+    """Cook-Torrance [n, rgb] (glTF B.3.2): Trowbridge-Reitz, Smith's joint masking, Schlick."""
+    distribution = alpha**2 / (np.pi * ((n_dot_h * alpha) ** 2 + 1.0 - n_dot_h**2) ** 2)
+    seen = n_dot_l * np.sqrt(n_dot_v**2 * (1.0 - alpha**2) + alpha**2)
+    lit = n_dot_v * np.sqrt(n_dot_l**2 * (1.0 - alpha**2) + alpha**2)
+    masking = 0.5 / (seen + lit)
+    fresnel = f0 + (1.0 - f0) * ((1.0 - v_dot_h) ** 5)[:, None]
+    return fresnel * (distribution * masking)[:, None]
+
+
+def environment_brdf(roughness: Float64, n_dot_v: Float64) -> tuple[Float64, Float64]:
+    """Scale and bias of f0 under light from everywhere: the fit of Karis 2014 ("Physically based
+    shading on mobile", after Lazarov 2013)."""
+    r = [
+        a * roughness + b
+        for a, b in ((-1.0, 1.0), (-0.0275, 0.0425), (-0.572, 1.04), (0.022, -0.04))
+    ]
+    grazing = np.minimum(r[0] ** 2, 2.0 ** (-9.28 * n_dot_v)) * r[0] + r[1]
+    return r[2] - 1.04 * grazing, r[3] + 1.04 * grazing
+
+
+def _eye_cosine(normal: Float64, toward_eye: Float64) -> Float64:
+    """|n·v|, off zero: an interpolated normal may turn away where the triangle does not."""
+    return np.clip(np.abs(_dot(normal, toward_eye)), 1e-4, 1.0)
+
+
+def _dot(a: Float64, b: Float64) -> Float64:
+    return np.asarray(np.sum(a * b, axis=-1))
+
+
+def opaque_at(shading: Shading, rig: Rig, grid: ViewGrid, seed: int = 0) -> Accepts:
+    """The test that visibility asks: whether a triangle counts at pixels."""
+
+    def accepts(index: int, pixels: Pixels) -> Bool:
+        material = int(shading.triangles.material[index])
+        kind = shading.scene.materials[material]
+        if kind.alpha_mode == "opaque":
+            return np.ones(len(pixels.row), bool)
+        ids = np.full(len(pixels.row), index)
+        points = points_at(shading.triangles, rig, grid, ids, pixels)
+        return accepted(kind, material, shading.alpha(points), pixels, seed)
+
+    return accepts
