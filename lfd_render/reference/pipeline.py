@@ -22,10 +22,11 @@ BLACK: Color = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class Views:
-    """linear: float64 [view, row, column, rgb]; visibility: what each pixel shows."""
+    """linear: float64 [view, row, column, rgb]; solid, blended: what each pixel shows of either."""
 
     linear: Float64
-    visibility: Visibility
+    solid: Visibility
+    blended: Visibility
 
 
 def render_views(
@@ -35,31 +36,32 @@ def render_views(
     display_from_world: Float64,
     *,
     background: Color = BLACK,
-    seed: int = 0,
 ) -> Views:
-    """All views of a scene. display_from_world: float64 [4, 4], as `Camera.display_from_world`."""
+    """All views of a scene. display_from_world: float64 [4, 4], as `Camera.display_from_world`.
+
+    Of blended surfaces the nearest lies over what is solid; those behind it do not show.
+    """
     triangles = placed(scene, display_from_world)
     shading = Shading(scene, triangles, np.linalg.inv(display_from_world).astype(np.float64))
-    visibility = visible(triangles, rig, grid, opaque_at(shading, rig, grid, seed))
-    linear = shaded(shading, visibility, rig, grid, background)
-    return Views(linear, visibility)
-
-
-def shaded(
-    shading: Shading,
-    visibility: Visibility,
-    rig: Rig,
-    grid: ViewGrid,
-    background: Color = BLACK,
-) -> Float64:
-    """View images [view, row, column, rgb] of what each pixel shows."""
+    solid = visible(triangles, rig, grid, opaque_at(shading, rig, grid))
+    blended = visible(triangles, rig, grid, over=solid)
     linear = np.empty((rig.views, grid.rows, grid.columns, 3))
     linear[...] = background
-    pixels, ids = visibility.shown()
+    shade_over(linear, shading, solid, rig, grid)
+    shade_over(linear, shading, blended, rig, grid)
+    return Views(linear, solid, blended)
+
+
+def shade_over(
+    linear: Float64, shading: Shading, shown: Visibility, rig: Rig, grid: ViewGrid
+) -> None:
+    """Lay what pixels show over view images [view, row, column, rgb], in place."""
+    pixels, ids = shown.shown()
     points = points_at(shading.triangles, rig, grid, ids, pixels)
     colors = shading.colors(points, rig.eye_x_mm[pixels.view], rig.distance_mm)
-    linear[pixels.view, pixels.row, pixels.column] = colors
-    return linear
+    opacity = np.where(shading.triangles.blended[ids], shading.alpha(points), 1.0)[:, None]
+    at = (pixels.view, pixels.row, pixels.column)
+    linear[at] = opacity * colors + (1.0 - opacity) * linear[at]
 
 
 def render_eia(
@@ -71,12 +73,11 @@ def render_eia(
     grid: ViewGrid | None = None,
     background: Color = BLACK,
     exposure: float = 1.0,
-    seed: int = 0,
 ) -> NDArray[np.uint8]:
     """The panel image, uint8 [y, x, rgb]; by default with the profile's views along its lenses."""
     rig = profile.rig() if rig is None else rig
     if grid is None:
         grid = ViewGrid.lens(profile, ViewGrid.default_rows(profile, rig.views))
     display_from_world = camera.display_from_world(profile.size_mm)
-    views = render_views(scene, rig, grid, display_from_world, background=background, seed=seed)
+    views = render_views(scene, rig, grid, display_from_world, background=background)
     return encoded(woven(views.linear, profile, grid), exposure)

@@ -139,26 +139,33 @@ def faces(whole: Float64, mirrored: Bool | bool, double_sided: Bool | bool) -> B
 
 
 def visible(
-    triangles: Triangles, rig: Rig, grid: ViewGrid, accepts: Accepts | None = None
+    triangles: Triangles,
+    rig: Rig,
+    grid: ViewGrid,
+    accepts: Accepts | None = None,
+    *,
+    over: Visibility | None = None,
 ) -> Visibility:
     """The nearest triangle of every view pixel; of those at one depth the one of smallest id.
 
-    accepts: which pixels a triangle is opaque at, everywhere by default. Triangles and their parts
+    accepts: which pixels a triangle is opaque at, everywhere by default. Without `over` the solid
+    triangles; with it the blended ones that lie no farther than it. Triangles and their parts
     closer to the eyes than rig.near_mm are not seen.
     """
     through = rays(rig, grid, Pixels(*np.ogrid[: grid.rows, : rig.views, : grid.columns]))
     ids = np.full((grid.rows, rig.views, grid.columns), NO_TRIANGLE, np.uint32)
-    depths = np.full(ids.shape, np.inf)
-    for index in range(len(triangles)):
+    # An equal depth keeps the smaller id, but a blended triangle lies over a solid one.
+    depths = np.full(ids.shape, np.inf) if over is None else np.nextafter(over.depths, np.inf)
+    for index in np.flatnonzero(triangles.blended == (over is not None)).tolist():
         meeting = meet(triangles.p_display[index], through, rig.distance_mm)
         found = covers(meeting, triangles, index, rig.near_mm)
-        found &= meeting.depths < depths  # an equal depth keeps the smaller id
+        found &= meeting.depths < depths
         if accepts is not None and found.any():
             at = np.nonzero(found)
             found[at] = accepts(index, Pixels(*at))
         ids[found] = index
         depths[found] = meeting.depths[found]
-    return Visibility(ids, depths)
+    return Visibility(ids, np.where(ids == NO_TRIANGLE, np.inf, depths))
 
 
 def covers(meeting: Meeting, triangles: Triangles, index: int | Int, near_mm: float) -> Bool:

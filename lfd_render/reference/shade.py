@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from lfd_render.display import Rig, ViewGrid
 from lfd_render.reference import studio
-from lfd_render.reference.coverage import accepted
 from lfd_render.reference.raster import Accepts, Pixels, faces, meet, rays
 from lfd_render.reference.textures import area_lod, mip_chain, sampled
 from lfd_render.reference.transform import Triangles, points_by, unit
@@ -288,16 +287,15 @@ def _dot(a: Float64, b: Float64) -> Float64:
     return np.asarray(np.sum(a * b, axis=-1))
 
 
-def opaque_at(shading: Shading, rig: Rig, grid: ViewGrid, seed: int = 0) -> Accepts:
-    """The test that visibility asks: whether a triangle counts at pixels."""
+def opaque_at(shading: Shading, rig: Rig, grid: ViewGrid) -> Accepts:
+    """The test that visibility asks: masks cut at their cutoff, all else counts everywhere."""
 
     def accepts(index: int, pixels: Pixels) -> Bool:
-        material = int(shading.triangles.material[index])
-        kind = shading.scene.materials[material]
-        if kind.alpha_mode == "opaque":
+        material = shading.scene.materials[int(shading.triangles.material[index])]
+        if material.alpha_mode != "mask":
             return np.ones(len(pixels.row), bool)
         ids = np.full(len(pixels.row), index)
         points = points_at(shading.triangles, rig, grid, ids, pixels)
-        return accepted(kind, material, shading.alpha(points), pixels, seed)
+        return shading.alpha(points) >= material.alpha_cutoff
 
     return accepts

@@ -19,7 +19,7 @@ class Triangles:
 
     p_display, normals_world: [triangle, corner, xyz]; texcoords: [triangle, corner, set, uv];
     colors: [triangle, corner, rgba], all float64. material, instance: int64 [triangle];
-    mirrored, double_sided: bool [triangle].
+    mirrored, double_sided, blended: bool [triangle].
     """
 
     p_display: Float64
@@ -30,27 +30,28 @@ class Triangles:
     instance: NDArray[np.int64]
     mirrored: NDArray[np.bool_]
     double_sided: NDArray[np.bool_]
+    blended: NDArray[np.bool_]
 
     def __len__(self) -> int:
         return len(self.p_display)
 
 
 def ordered_instances(scene: Scene) -> Iterator[tuple[int, Instance, Mesh]]:
-    """Instances in the order of their triangles' ids: the opaque ones first, then those with alpha.
+    """Instances in the order of their triangles' ids: opaque, then masked, then blended ones.
 
     Yields the index of the instance, the instance and its mesh.
     """
-    for opaque in (True, False):
+    for mode in ("opaque", "mask", "blend"):
         for index, instance in enumerate(scene.instances):
             mesh = scene.meshes[instance.mesh]
-            if (scene.materials[mesh.material].alpha_mode == "opaque") == opaque:
+            if scene.materials[mesh.material].alpha_mode == mode:
                 yield index, instance, mesh
 
 
 def placed(scene: Scene, display_from_world: Float64) -> Triangles:
     """The triangles of a scene before a display. display_from_world: float64 [4, 4], affine."""
     p_display, normals, texcoords, colors, material, instances = [], [], [], [], [], []
-    mirrored, double_sided = [], []
+    mirrored, double_sided, blended = [], [], []
     for index, instance, mesh in ordered_instances(scene):
         corners = mesh.triangles
         display_from_local = display_from_world @ instance.world_from_local
@@ -62,7 +63,9 @@ def placed(scene: Scene, display_from_world: Float64) -> Triangles:
         material.append(np.full(count, mesh.material))
         instances.append(np.full(count, index))
         mirrored.append(np.full(count, np.linalg.det(display_from_local[:3, :3]) < 0.0))
-        double_sided.append(np.full(count, scene.materials[mesh.material].double_sided))
+        kind = scene.materials[mesh.material]
+        double_sided.append(np.full(count, kind.double_sided))
+        blended.append(np.full(count, kind.alpha_mode == "blend"))
     return Triangles(
         np.concatenate(p_display),
         np.concatenate(normals),
@@ -72,6 +75,7 @@ def placed(scene: Scene, display_from_world: Float64) -> Triangles:
         np.concatenate(instances),
         np.concatenate(mirrored),
         np.concatenate(double_sided),
+        np.concatenate(blended),
     )
 
 
