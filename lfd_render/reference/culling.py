@@ -1,4 +1,4 @@
-"""Stochastic culling: which tiny triangles the paper keeps (Gavane and Watson 2023, section 3.2)."""
+"""Stochastic culling: which tiny triangles the paper keeps (Gavane and Watson 2023, 3.2)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def areas_px(triangles: Triangles, rig: Rig, grid: ViewGrid) -> Float64:
 
 
 def kept(area_px: Float64, seed: int) -> NDArray[np.bool_]:
-    """Which triangles stay, [triangle]: by a hash of id and seed, so that frames can be repeated."""
+    """Which triangles stay, [triangle]: by a hash of id and seed, so a frame can be repeated."""
     ids = np.arange(len(area_px))
     drawn = hash_unit(ids, np.full_like(ids, seed), np.zeros_like(ids))
     return (area_px >= SMALLEST_AREA) | (drawn < 10.0 * area_px)
@@ -37,7 +37,8 @@ def hash_unit(x: Int, y: Int, z: Int) -> Float64:
     factors = (747796405, 2891336453, 277803737)
     state: NDArray[np.uint64] = np.full(len(x), 1, np.uint64)
     for word, factor in zip((x, y, z), factors, strict=True):
-        state = np.asarray((state + (word.astype(np.uint64) & low) * np.uint64(factor)) & low)
+        mixed = state + (word.astype(np.uint64) & low) * np.uint64(factor)
+        state = (mixed & low).astype(np.uint64)
     shift = (state >> np.uint64(28)) + np.uint64(4)
-    word = (((state >> shift) ^ state) * np.uint64(277803737)) & low
-    return np.asarray(((word >> np.uint64(22)) ^ word).astype(np.float64) / 2.0**32)
+    turned = (((state >> shift) ^ state) * np.uint64(277803737)) & low
+    return np.asarray(((turned >> np.uint64(22)) ^ turned).astype(np.float64) / 2.0**32)
