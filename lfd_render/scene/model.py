@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Literal, TypedDict
+from typing import Any, Literal, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ class WindowCamera(TypedDict):
     eye_direction: list[float]
     up: list[float]
     window_height: float
+    depth_scale: NotRequired[float]
 
 
 @dataclass(frozen=True, eq=False)

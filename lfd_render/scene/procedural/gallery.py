@@ -1,8 +1,9 @@
 """`builtin:gallery`: a museum hall that fills the view, with four texture maps on every surface.
 
-Metres. The window is 3 m high round the origin, 1.65 m above the floor; the hall is a closed
-room that contains it, so each ray through the window meets a wall, from any eye and at any yaw.
-Two statues stand in front of the window plane, the rest of the hall lies behind it.
+Metres. The window is 3 m high and stands in the middle of the hall, a closed room whose walls
+face inwards: each ray through the window crosses the room and so meets a wall, from any eye and
+at any yaw. Statues stand before and behind the window. Depth is squeezed to 0.55, which leaves
+neighbouring views at most about two columns apart on a 27-inch display with a 40° cone.
 """
 
 from __future__ import annotations
@@ -20,11 +21,10 @@ from lfd_render.scene.procedural.grid import Surface, SurfaceMap, tessellate
 from lfd_render.scene.procedural.shapes import frame, lathe, plane, rounded, sphere, torus_knot
 from lfd_render.scene.procedural.textures import TextureSet, to_pixels
 
-_HALF_WIDTH, _FLOOR, _CEILING, _BACK, _FRONT = 4.4, -1.65, 2.0, -5.6, 4.4
+_HALF_WIDTH, _FLOOR, _CEILING, _BACK, _FRONT = 4.4, -1.4, 1.58, -3.25, 3.25
 _HEIGHT = _CEILING - _FLOOR
 _OVERLAP = 0.05
 _STAND = _FLOOR - 0.01  # things sink in a little, so that no two faces coincide
-_WINDOW_HEIGHT = 3.0
 
 _SETS: dict[str, Callable[[int], TextureSet]] = {
     "floor": paint.floor_tiles,
@@ -83,7 +83,8 @@ def gallery(triangles: int, textures: int) -> Scene:
             "target": [0.0, 0.0, 0.0],
             "eye_direction": [0.0, 0.0, 1.0],
             "up": [0.0, 1.0, 0.0],
-            "window_height": _WINDOW_HEIGHT,
+            "window_height": 3.0,
+            "depth_scale": 0.55,
         },
     )
 
@@ -135,12 +136,12 @@ def _step(value: NDArray[np.float32], start: float, width: float) -> NDArray[np.
 
 
 def _coffers(u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Beams 0.22 m deep round recessed fields, 6 across and 7 along the hall."""
+    """Beams 0.17 m deep round recessed fields, 6 across and 4 along the hall."""
     across = np.abs((u * 6) % 1 - np.float32(0.5))
-    along = np.abs((v * 7) % 1 - np.float32(0.5))
+    along = np.abs((v * 4) % 1 - np.float32(0.5))
     edge = np.maximum(across, along)
-    beams = np.float32(0.16) * _step(edge, 0.34, 0.04)
-    relief: NDArray[np.float32] = beams + np.float32(0.06) * _step(edge, 0.26, 0.03)
+    beams = np.float32(0.12) * _step(edge, 0.34, 0.04)
+    relief: NDArray[np.float32] = beams + np.float32(0.05) * _step(edge, 0.26, 0.03)
     return relief
 
 
@@ -148,8 +149,8 @@ def _wainscot(v: NDArray[np.float32]) -> NDArray[np.float32]:
     """Skirting, dado rail and cornice, in metres from the wall; v runs down its height."""
     y = v * np.float32(_HEIGHT + 2 * _OVERLAP) - np.float32(_OVERLAP)
     cornice = np.float32(0.16) * (1 - _step(y, 0.10, 0.14))
-    rail = np.float32(0.05) * _step(y, 2.62, 0.03) * (1 - _step(y, 2.72, 0.04))
-    skirting = np.float32(0.06) * _step(y, 3.43, 0.05)
+    rail = np.float32(0.05) * _step(y, 2.10, 0.03) * (1 - _step(y, 2.19, 0.04))
+    skirting = np.float32(0.06) * _step(y, 2.76, 0.05)
     relief: NDArray[np.float32] = cornice + rail + skirting
     return relief
 
@@ -166,15 +167,15 @@ def _panels(u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[np.float3
 
 
 def _niche(u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A half-round arched niche, 0.9 m deep over a sill, in the middle of the wall."""
+    """A half-round arched niche, 0.7 m deep over a sill, in the middle of the wall."""
     x = (u - np.float32(0.5)) * np.float32(2 * (_HALF_WIDTH + _OVERLAP))
     y = np.float32(_CEILING + _OVERLAP) - v * np.float32(_HEIGHT + 2 * _OVERLAP)
-    above = np.maximum(y - np.float32(0.55), 0.0)
+    above = np.maximum(y - np.float32(0.28), 0.0)
     radius = np.hypot(x, above)
-    hollow = np.float32(0.9) * np.sqrt(np.clip(1 - (radius / np.float32(1.05)) ** 2, 0.0, 1.0))
-    hollow *= _step(y, -1.32, 0.04)
-    rim = np.float32(0.06) * (_step(radius, 1.05, 0.03) - _step(radius, 1.22, 0.05))
-    relief: NDArray[np.float32] = _wainscot(v) * _step(radius, 1.05, 0.02) + rim - hollow
+    hollow = np.float32(0.7) * np.sqrt(np.clip(1 - (radius / np.float32(0.85)) ** 2, 0.0, 1.0))
+    hollow *= _step(y, -1.12, 0.04)
+    rim = np.float32(0.06) * (_step(radius, 0.85, 0.03) - _step(radius, 0.98, 0.05))
+    relief: NDArray[np.float32] = _wainscot(v) * _step(radius, 0.85, 0.02) + rim - hollow
     return relief
 
 
@@ -220,12 +221,13 @@ def _turned(
 def _add_columns(hall: _Hall) -> None:
     top = _HEIGHT + 0.03
     profile = [
-        (0.0, top), (0.42, top), (0.42, top - 0.12), (0.34, top - 0.20), (0.30, top - 0.32),
-        (0.25, top - 0.36), (0.29, 0.42), (0.37, 0.34), (0.33, 0.26), (0.42, 0.16),
-        (0.42, 0.0), (0.0, 0.0),
+        (0.0, top), (0.36, top), (0.36, top - 0.11), (0.29, top - 0.18), (0.26, top - 0.28),
+        (0.21, top - 0.31), (0.25, 0.36), (0.32, 0.29), (0.28, 0.22), (0.36, 0.14),
+        (0.36, 0.0), (0.0, 0.0),
     ]  # fmt: skip
     column = _turned("column", "marble", profile, flutes=20, least=(4, 4), detail=3.0)
-    places = [_at(x, _STAND, z) for z in (-4.6, -2.7, -0.8, 3.0) for x in (-3.35, 3.35)]
+    spots = ((3.1, -2.5), (3.05, -0.8), (3.65, 2.4))
+    places = [_at(side * x, _STAND, z) for x, z in spots for side in (-1, 1)]
     hall.add(column, *places)
 
 
@@ -238,15 +240,15 @@ def _plinth(hall: _Hall, height: float, half: float, *places: NDArray[np.float64
 
 
 def _add_sculptures(hall: _Hall) -> None:
-    _plinth(hall, 0.86, 0.34, _at(-1.35, _STAND, 0.42, 20), _at(1.45, _STAND, 0.20, -15))
-    hall.add(_knot("bronze knot", "bronze", (2, 3), 0.46, 0.13), _at(-1.35, -0.25, 0.42, 25))
+    _plinth(hall, 0.72, 0.33, _at(-1.35, _STAND, 0.70, 20), _at(1.42, _STAND, 0.35, -15))
+    hall.add(_knot("bronze knot", "bronze", (2, 3), 0.46, 0.13), _at(-1.35, -0.14, 0.70, 25))
     bumpy = _round("gilt planet", "gilt", 0.46, bumps=_bumps)
-    hall.add(bumpy, _at(1.45, -0.345, 0.20))
-    _plinth(hall, 0.52, 0.44, _at(0.0, _STAND, -1.2, 45))
-    hall.add(_knot("great knot", "gilt", (3, 4), 0.60, 0.10), _at(0.0, -0.455, -1.2, -20))
-    _plinth(hall, 0.95, 0.30, _at(-2.75, _STAND, -1.75), _at(2.75, _STAND, -1.75))
-    hall.add(_vase(), _at(-2.75, _STAND + 0.945, -1.75), _at(2.75, _STAND + 0.945, -1.75))
-    hall.add(_figure(), _at(0.0, _STAND, -5.75))
+    hall.add(bumpy, _at(1.42, -0.24, 0.35))
+    _plinth(hall, 0.42, 0.42, _at(0.0, _STAND, -0.95, 45))
+    hall.add(_knot("great knot", "gilt", (3, 4), 0.54, 0.09), _at(0.0, -0.37, -0.95, -20))
+    _plinth(hall, 0.80, 0.28, _at(-2.35, _STAND, -1.35), _at(2.35, _STAND, -1.35))
+    hall.add(_vase(), *(_at(x, _STAND + 0.795, -1.35) for x in (-2.35, 2.35)))
+    hall.add(_figure(), _at(0.0, _STAND, _BACK - 0.15))
 
 
 def _knot(
@@ -308,26 +310,26 @@ def _vase() -> Surface:
 def _figure() -> Surface:
     """A turned marble figure on its own drum, for the niche."""
     profile = [
-        (0.0, 2.92), (0.09, 2.89), (0.14, 2.79), (0.13, 2.66), (0.07, 2.57), (0.09, 2.51),
-        (0.25, 2.45), (0.29, 2.31), (0.22, 2.00), (0.17, 1.82), (0.24, 1.50), (0.33, 1.08),
-        (0.37, 1.02), (0.46, 0.98), (0.46, 0.10), (0.54, 0.0), (0.0, 0.0),
+        (0.0, 2.29), (0.08, 2.26), (0.12, 2.18), (0.11, 2.07), (0.06, 2.00), (0.08, 1.95),
+        (0.22, 1.90), (0.25, 1.78), (0.19, 1.52), (0.15, 1.38), (0.21, 1.12), (0.29, 0.78),
+        (0.32, 0.73), (0.40, 0.70), (0.40, 0.08), (0.46, 0.0), (0.0, 0.0),
     ]  # fmt: skip
     return _turned("figure", "marble", rounded(profile))
 
 
 def _add_pictures(hall: _Hall) -> None:
-    width, height, y = 1.25, 1.0, 0.42
+    width, height, y = 1.16, 0.90, 0.30
     offset = 0.09  # clear of the wall's mouldings
     side = _HALF_WIDTH - offset
     places = [
-        _at(-2.25, y, _BACK + offset),
-        _at(2.25, y, _BACK + offset),
-        _at(-side, y, -3.65, 90),
-        _at(side, y, -3.65, -90),
-        _at(-side, y, -1.75, 90),
-        _at(side, y, -1.75, -90),
+        _at(-1.92, y, _BACK + offset),
+        _at(1.92, y, _BACK + offset),
+        _at(-side, y, -1.5, 90),
+        _at(side, y, -1.5, -90),
+        _at(-side, y, 0.9, 90),
+        _at(side, y, 0.9, -90),
     ]
-    rim = 0.13
+    rim = 0.12
     border = Surface(
         "picture frame",
         frame(width, height, rim, 0.09),
@@ -350,12 +352,12 @@ def _add_pictures(hall: _Hall) -> None:
 
 
 def _add_lamps(hall: _Hall) -> None:
-    spots = [(x, z) for z in (-3.6, -1.2) for x in (-1.5, 1.5)]
-    globe = _round("lamp", "lamp", 0.17, uv_scale=(1.0, 1.0), least=(5, 3))
-    hall.add(globe, *(_at(x, 1.15, z) for x, z in spots))
-    rod = [(0.0, 0.75), (0.10, 0.74), (0.012, 0.68), (0.012, 0.06), (0.05, 0.0), (0.0, 0.0)]
+    spots = [(-1.75, -0.6), (1.75, -0.6), (-0.62, -1.9), (0.62, -1.9)]
+    globe = _round("lamp", "lamp", 0.15, uv_scale=(1.0, 1.0), least=(5, 3))
+    hall.add(globe, *(_at(x, 0.94, z) for x, z in spots))
+    rod = [(0.0, 0.62), (0.10, 0.61), (0.012, 0.55), (0.012, 0.06), (0.05, 0.0), (0.0, 0.0)]
     surface = _turned("lamp rod", "gilt", rod, detail=8.0, least=(3, 3), tile=0.3)
-    hall.add(surface, *(_at(x, 1.28, z) for x, z in spots))
+    hall.add(surface, *(_at(x, 1.05, z) for x, z in spots))
 
 
 def _materials(size: int) -> tuple[tuple[Material, ...], tuple[Image, ...]]:

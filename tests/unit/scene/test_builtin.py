@@ -166,33 +166,69 @@ def test_texture_v_runs_down_and_u_to_the_right(name: str) -> None:
         assert (turned[real] < 0).mean() > 0.99, mesh.name
 
 
-def test_the_gallery_fills_the_window_for_every_eye() -> None:
-    """Each ray from an eye of a 54° cone through the window meets the hall behind the window.
+def inner_room(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """The largest box that no wall, floor or ceiling reaches into, reliefs counted."""
+    part = {m.name: m.positions.astype(np.float64) for m in scene.meshes}
+    low = (part["left wall"][:, 0].max(), part["floor"][:, 1].max(), part["back wall"][:, 2].max())
+    high = (
+        part["right wall"][:, 0].min(),
+        part["ceiling"][:, 1].min(),
+        part["front wall"][:, 2].min(),
+    )
+    return np.array(low), np.array(high)
 
-    Walls, floor and ceiling are heights over planes; a ray through the box must leave it.
+
+@pytest.mark.parametrize(("width", "height"), [(345.4, 194.3), (120.4, 160.6)])
+def test_the_gallery_fills_the_window_for_every_eye_at_any_yaw(
+    rng: np.random.Generator, width: float, height: float
+) -> None:
+    """Each ray from an eye of a 40° cone through the window crosses the box inside the room.
+
+    Whatever leaves that box meets a wall, since the walls face inwards and overlap at their edges.
     """
     scene = load("gallery", 100_000)
-    room = {m.name: m for m in scene.meshes if "wall" in m.name or m.name in ("floor", "ceiling")}
-    low = np.array([room["left wall"].positions[:, 0].max(), room["floor"].positions[:, 1].max()])
-    high = np.array(
-        [room["right wall"].positions[:, 0].min(), room["ceiling"].positions[:, 1].min()]
-    )
-    # At the window the room reaches beyond the widest window, so every ray starts inside it …
-    assert scene.default_camera is not None
-    half_height = scene.default_camera["window_height"] / 2
-    assert low[0] < -16 / 9 * half_height
-    assert high[0] > 16 / 9 * half_height
-    assert low[1] < -half_height < half_height < high[1]
-    # … and the six surfaces overlap along their edges, so it cannot leave but through one.
-    back, front = room["back wall"].positions, room["front wall"].positions
-    for part in ("left wall", "right wall", "floor", "ceiling"):
-        depth = room[part].positions[:, 2]
-        assert depth.min() < back[:, 2].max()
-        assert depth.max() > front[:, 2].min()
-    for part in ("left wall", "right wall", "back wall", "front wall"):
-        height = room[part].positions[:, 1]
-        assert height.min() < low[1]
-        assert height.max() > high[1]
+    low, high = inner_room(scene)
+    camera = scene.default_camera
+    assert camera is not None
+    count = 20_000
+    distance = 3.09 * height
+    eye = np.zeros((count, 3))
+    eye[:, 0] = rng.uniform(-1, 1, count) * distance * np.tan(np.deg2rad(20))
+    eye[:, 2] = distance
+    window = rng.uniform(-0.5, 0.5, (count, 3)) * (width, height, 0)
+    scale = camera["window_height"] / height
+    yaw = rng.uniform(0, 2 * np.pi, count)
+
+    def to_world(p_display: np.ndarray) -> np.ndarray:
+        x, y, z = (p_display * (1, 1, 1 / camera["depth_scale"]) * scale).T
+        return np.stack(
+            (x * np.cos(yaw) - z * np.sin(yaw), y, x * np.sin(yaw) + z * np.cos(yaw)), 1
+        )
+
+    start = to_world(eye)
+    ray = to_world(window) - start
+    first, second = (low - start) / ray, (high - start) / ray
+    enters = np.minimum(first, second).max(axis=1)
+    leaves = np.maximum(first, second).min(axis=1)
+    near = 0.05  # of the distance, as the rig has it
+    assert (leaves > np.maximum(enters, near)).all()
+
+
+def test_the_walls_of_the_gallery_overlap_along_every_edge() -> None:
+    scene = load("gallery", 100_000)
+    low, high = inner_room(scene)
+    part = {m.name: m.positions for m in scene.meshes}
+    for name, along in {
+        "floor": (0, 2),
+        "ceiling": (0, 2),
+        "left wall": (1, 2),
+        "right wall": (1, 2),
+        "back wall": (0, 1),
+        "front wall": (0, 1),
+    }.items():
+        for axis in along:
+            assert part[name][:, axis].min() < low[axis], name
+            assert part[name][:, axis].max() > high[axis], name
 
 
 def test_gallery_content_stands_on_both_sides_of_the_panel() -> None:
