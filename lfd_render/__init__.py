@@ -1,3 +1,31 @@
 """Light-field rendering for tilted-lenticular displays: scenes in, panel images out."""
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from lfd_render.display import Camera, DisplayProfile
+    from lfd_render.panel.eia import Eia
+    from lfd_render.panel.look import look
+    from lfd_render.renderer import Renderer
+    from lfd_render.scene import Scene
+
 __version__ = "0.1.0"
+
+__all__ = ["Camera", "DisplayProfile", "Eia", "Renderer", "Scene", "__version__", "look"]
+
+# Loaded when first used, so that the command line answers --help without numpy or OpenGL.
+_HOMES = {
+    "Camera": "lfd_render.display",
+    "DisplayProfile": "lfd_render.display",
+    "Eia": "lfd_render.panel.eia",
+    "Renderer": "lfd_render.renderer",
+    "Scene": "lfd_render.scene",
+    "look": "lfd_render.panel.look",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'lfd_render' has no attribute '{name}'")
+    return getattr(import_module(_HOMES[name]), name)

@@ -7,6 +7,8 @@ from typing import Any
 TEXTURE_2D = 0x0DE1
 TEXTURE_2D_ARRAY = 0x8C1A
 RGBA32UI = 0x8D70
+R32UI = 0x8236
+RED_INTEGER = 0x8D94
 RGBA_INTEGER = 0x8D99
 UNSIGNED_INT = 0x1405
 SRGB8_ALPHA8 = 0x8C43
@@ -74,6 +76,7 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "glTextureSubImage3D": (None, (_u, _i, _i, _i, _i, _i, _i, _i, _u, _u, _p)),
     "glTextureParameteri": (None, (_u, _u, _i)),
     "glGenerateTextureMipmap": (None, (_u,)),
+    "glClearNamedBufferData": (None, (_u, _u, _u, _u, _p)),
     "glClearTexImage": (None, (_u, _i, _u, _u, _p)),
     "glBindTextureUnit": (None, (_u, _u)),
     "glBindImageTexture": (None, (_u, _u, _i, ctypes.c_ubyte, _i, _u, _u)),

@@ -17,12 +17,14 @@ from lfd_render.gpu import layout
 VERSION_LINE = "#version 450 core"
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 # Mesa: "0:12(3): error: …"; NVIDIA: "0(12) : error …"
-_LOCATION = re.compile(r"\b(\d+)(:(\d+)\(\d+\)|\((\d+)\))")
+_LOCATION = re.compile(r"\b0(?::(\d+)\(\d+\)|\((\d+)\))")
+# Mesa 22.3 forgets the source-string number of #line, so line numbers carry the file.
+_LINES_A_FILE = 100_000
 
 
 @dataclass
 class Source:
-    """An assembled shader: its text, and the files behind the numbers of its #line directives."""
+    """An assembled shader: its text, and the files behind the lines of its #line directives."""
 
     path: str
     text: str
@@ -32,7 +34,7 @@ class Source:
         """A compiler's message with file names for file numbers."""
 
         def place(match: re.Match[str]) -> str:
-            number, line = int(match[1]), match[3] or match[4]
+            number, line = divmod(int(match[1] or match[2]), _LINES_A_FILE)
             known = number < len(self.files)
             return f"shaders/{self.files[number]}:{line}" if known else match[0]
 
@@ -65,7 +67,7 @@ def _append(source: Source, lines: list[str], path: str, folder: Path) -> None:
     """Append one file's lines, each include in its place, with #line directives."""
     number = len(source.files)
     source.files.append(path)
-    lines.append(f"#line 1 {number}")
+    lines.append(f"#line {number * _LINES_A_FILE + 1}")
     for line_number, line in enumerate(_read(path, folder), start=1):
         match = _INCLUDE.match(line)
         if match is None:
@@ -73,7 +75,7 @@ def _append(source: Source, lines: list[str], path: str, folder: Path) -> None:
             continue
         if match[1] not in source.files:
             _append(source, lines, match[1], folder)
-        lines.append(f"#line {line_number + 1} {number}")
+        lines.append(f"#line {number * _LINES_A_FILE + line_number + 1}")
 
 
 def _read(path: str, folder: Path) -> list[str]:
