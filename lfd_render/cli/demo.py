@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-SCENE = "builtin:spheres"
+SCENE = "builtin:gallery?triangles=300000"
 # Where the eyes are, in cones from the middle.
 EYES = {"left": -0.375, "centre": 0.0, "right": 0.375}
 GAP_PX = 8

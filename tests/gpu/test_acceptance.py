@@ -277,7 +277,7 @@ def test_a_ground_that_runs_under_the_viewer_is_whole(
     words, depths = winners(
         device, unlit_scene((*ground, (1, 1, 1))), display, rig, grid, general=general
     )
-    # With t the part of its way to the window, the ray to window point (x, y) meets Y = −40 + tilt·X
+    # The ray to window point (x, y) meets Y = −40 + tilt·X at t times its way to the window,
     # where t·(y − tilt·(x − s)) = tilt·s − 40.
     x = (np.arange(480) + 0.5) / 480 * display.size_mm[0] - display.size_mm[0] / 2
     y = grid.row_mm()[:, None, None]
