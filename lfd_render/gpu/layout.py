@@ -101,25 +101,15 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("uint", "items"),
         ("uint", "visible"),  # triangles of all windows
     ),
-    # A triangle on one row, ready for all views: the slice's ends (column = a_column +
-    # a_toward·eye), the plane, and the points along it, cells of the densest eye's columns.
+    # A triangle on one row, ready for all views: where the ends of its slice appear (see
+    # common/shear.glsl). From a to b is left to right in the views that a single-sided one faces.
     "PointRow": (
         ("float", "a_column"),
-        ("float", "a_toward"),
+        ("float", "a_k"),
         ("float", "b_column"),
-        ("float", "b_toward"),
-        ("float", "normal_x"),
-        ("float", "normal_y"),
-        ("float", "normal_z"),
-        ("float", "at_centre"),
-        ("float", "depth_near"),
-        ("float", "depth_far"),
-        ("float", "densest_eye"),  # in columns
-        ("float", "cell"),  # length of a point, in columns
+        ("float", "b_k"),
         ("uint", "triangle"),  # within its batch
-        ("uint", "row"),
-        ("uint", "facing"),
-        ("float", "row_offset"),  # column of window x = 0 on this row
+        ("uint", "row_sides"),  # row, and DOUBLE_SIDED above it
     ),
     # Counts of the list of blocks to shade: the first three words dispatch.
     "BlockWork": (
@@ -136,7 +126,7 @@ CONSTANTS: dict[str, int] = {
     "FACING_BOTH": 2,  # bit: double-sided
     "TEXTURE_ROLES": len(TEXTURE_ROLES),
     "NO_TRIANGLE": 0xFFFFFFFF,  # the word of a view pixel that shows the background
-    "FACING_NOWHERE": 4,
+    "DOUBLE_SIDED": 1 << 16,
     "ALPHA_OPAQUE": 0,
     "ALPHA_MASK": 1,
     "ALPHA_BLEND": 2,

@@ -105,12 +105,8 @@ class Batch:
         return {"Triangles": self.corners, "DisplayPositions": self.display_positions}
 
     def attributes(self) -> dict[str, Buffer]:
-        """What shading reads at vertices, by block name."""
-        return {
-            "TexCoords": self.uv0,
-            "WorldNormals": self.world_normals,
-            "VertexExtras": self.extras,
-        }
+        """Texture coordinates and colours of vertices, by block name."""
+        return {"TexCoords": self.uv0, "VertexExtras": self.extras}
 
     def release(self) -> None:
         """Free the batch."""

@@ -109,6 +109,7 @@ class RasterForward:
             "LocalPositions": batch.local_positions,
             "Draws": self._scene.draws,
             **batch.attributes(),
+            "WorldNormals": batch.world_normals,
             "FrameBlock": band.frame(batch),
             **self._scene.materials_of(),
         }

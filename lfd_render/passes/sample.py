@@ -15,7 +15,7 @@ from lfd_render.passes.view_target import Band
 
 SEGMENT = 64  # triangles a thread of the prefix sum takes
 GROUPS_ACROSS = 32768  # work groups along x before y grows
-MOST_WINDOW_ITEMS = 1 << 20  # rows of points that one buffer holds: 64 MiB
+MOST_WINDOW_ITEMS = 1 << 21  # rows of points that one buffer holds: 48 MiB
 _HEADROOM = 1.25  # of a window over the items found, so that a moving scene rarely outgrows it
 _SPAN_GROUP = 128  # local_size_x of sample/span.comp
 _SEGMENT_GROUP = 64  # local_size_x of sample/sum.comp and sample/compact.comp
@@ -27,8 +27,8 @@ class PointCloud:
     """Points of one batch and band. spans: Span [triangle]; visible: Visible [≤ triangles]; rows:
     PointRow [≤ window_items], one window of the items at a time; work: Work [window].
 
-    A row holds the points of one triangle on one window row: cells, `cell` columns long, of the
-    densest eye's columns, which need no storage of their own.
+    A row holds the points of one triangle on one window row: cells, Span.point_columns long, of
+    the densest eye's columns, which need no storage of their own.
     """
 
     spans: Buffer
@@ -190,7 +190,10 @@ class Sample:
             self.rows(batch, points, band, window)
             self._count.set(
                 {
+                    **batch.geometry(),
+                    "Draws": self._scene.draws,
                     "FrameBlock": band.frame(batch),
+                    "Spans": points.spans,
                     "PointRows": points.rows,
                     "WorkBlock": points.work,
                     "PointCount": self._total,

@@ -81,6 +81,7 @@ class Shade:
                     **shared,
                     **batch.geometry(),
                     **batch.attributes(),
+                    "WorldNormals": batch.world_normals,
                     **self._scene.materials_of(),
                     "Draws": self._scene.draws,
                     "Eyes": band.target.eyes,

@@ -111,6 +111,7 @@ class Splat:
             "PointRows": points.rows,
             "WorkBlock": points.work,
             "Eyes": band.target.eyes,
+            "RowOffsets": band.target.row_offsets,
             **self._projection,
             "Depths": views.depths,
             "Words": views.words,

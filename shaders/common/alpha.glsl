@@ -4,12 +4,16 @@
 #include "common/textures.glsl"
 #include "common/vertices.glsl"
 
-bool alpha_accepts(uint triangle, Plane plane, float eye_mm, float x_mm, float y_mm) {
+layout(std430) readonly restrict buffer RowOffsets { float row_offsets[]; };
+
+// eye: in columns.
+bool alpha_accepts(uint triangle, float eye, int row, int column) {
     uvec4 corners = triangles[triangle];
     vec3 a = display_positions[corners.x].xyz;
     vec3 b = display_positions[corners.y].xyz;
     vec3 c = display_positions[corners.z].xyz;
-    Hit hit = hit_triangle(a, b, c, plane, eye_mm, x_mm, y_mm);
+    float x_mm = (float(column) + 0.5 - row_offsets[row]) * frame.column_mm;
+    Hit hit = hit_triangle(a, b, c, triangle_plane(a, b, c), eye * frame.column_mm, x_mm, row_centre_mm(row));
     uint material = draws[corners.w].material;
     float alpha = material_base_color(material).a;
     if (VERTEX_EXTRAS != 0)

@@ -1,7 +1,9 @@
-// A row of points, read back.
+// A row of points, read back: a triangle's slice by a window row, ready for all views. Its points are
+// the cells that it touches of the columns of the eye that sees the triangle densest (density.glsl).
+// Points own half-open cells, so that in every view their footprints, cut to the triangle, abut, and
+// the row's footprint is the one interval between the slice's ends.
 
 #include "common/shear.glsl"
-#include "common/plane.glsl"
 #include "layout/PointRow"
 #include "layout/Work"
 
@@ -10,18 +12,10 @@ layout(std430) readonly restrict buffer WorkBlock { Work work[]; };
 
 uniform int window;
 
-Slice row_slice(PointRow points) {
-    return Slice(SliceEnd(points.a_column, points.a_toward), SliceEnd(points.b_column, points.b_toward), true);
+Slice slice_of(PointRow points) {
+    return Slice(SliceEnd(points.a_column, points.a_k), SliceEnd(points.b_column, points.b_k), true);
 }
 
-Plane row_plane(PointRow points) {
-    return Plane(vec3(points.normal_x, points.normal_y, points.normal_z), points.at_centre,
-                 vec2(points.depth_near, points.depth_far));
-}
-
-// First and end index of the cells that a row's slice touches, in the densest view.
-ivec2 row_cells(PointRow points, Slice slice) {
-    float from = column_from(slice.a, points.densest_eye), to = column_from(slice.b, points.densest_eye);
-    int first = int(floor(from / points.cell));
-    return ivec2(first, max(first + 1, int(ceil(to / points.cell))));
+int row_of(PointRow points) {
+    return int(points.row_sides & 0xFFFFu);
 }

@@ -4,10 +4,10 @@
 
 #include "common/frame.glsl"
 
-// Where one end of such a segment appears: column = at_centre + toward·eye, eyes in columns.
+// Where one end of such a segment appears: column = at_centre + (1 − k)·eye, eyes in columns.
 struct SliceEnd {
     float at_centre;
-    float toward;  // 1 − k
+    float k;
 };
 
 struct Slice {
@@ -17,7 +17,7 @@ struct Slice {
 };
 
 float column_from(SliceEnd end, float eye) {
-    precise float column = end.at_centre + end.toward * eye;
+    precise float column = end.at_centre + (1.0 - end.k) * eye;
     return column;
 }
 
@@ -46,7 +46,7 @@ vec3 crossing(vec3 p, vec3 q, float above_p, float above_q) {
 SliceEnd slice_end(vec3 p_display, float row_offset) {
     precise float k = frame.distance_mm / depth_of(p_display);
     precise float at_centre = k * p_display.x / frame.column_mm + row_offset;
-    return SliceEnd(at_centre, 1.0 - k);
+    return SliceEnd(at_centre, k);
 }
 
 // Part of the segment p…q (parameters 0…1) where a linear function with these end values is ≥ 0.

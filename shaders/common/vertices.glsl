@@ -1,11 +1,9 @@
-// Vertex attributes that shading reads. Few scenes have a second coordinate set or colours; without
+// Texture coordinates and colours of vertices. Few scenes have a second coordinate set or colours; without
 // them VERTEX_EXTRAS is 0 and nothing is loaded.
 
 #include "layout/VertexExtra"
-#include "common/octahedral.glsl"
 
 layout(std430) readonly restrict buffer TexCoords { vec2 tex_coords[]; };
-layout(std430) readonly restrict buffer WorldNormals { uint world_normals[]; };
 layout(std430) readonly restrict buffer VertexExtras { VertexExtra vertex_extras[]; };
 
 vec2 vertex_uv1(uint vertex) {

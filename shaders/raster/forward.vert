@@ -4,6 +4,7 @@
 
 #include "common/frame.glsl"
 #include "common/vertices.glsl"
+#include "common/normals.glsl"
 #include "layout/Draw"
 
 layout(std430) readonly restrict buffer DisplayPositions { vec4 display_positions[]; };
@@ -35,7 +36,7 @@ void main() {
     gl_ClipDistance[1] = 0.5 * frame.panel_width_mm * d - x_times_d;
 
     p_world = (world_from_display * p_display).xyz;
-    normal_world = direction_from(world_normals[gl_VertexID]);
+    normal_world = vertex_normal(uint(gl_VertexID));
     uv01 = vec4(tex_coords[gl_VertexID], vertex_uv1(uint(gl_VertexID)));
     color = vertex_color(uint(gl_VertexID));
     material = draws[floatBitsToUint(local_positions[gl_VertexID].w)].material;

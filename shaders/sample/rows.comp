@@ -1,5 +1,5 @@
 // The rows of points that splatting reads: one thread an item, an item being a row of a visible
-// triangle. The points on it are the cells, `cell` columns long, of the densest eye's columns.
+// triangle.
 // In: the batch, Spans, VisibleTriangles, Work, RowOffsets. Out: PointRows, from the window's first.
 
 layout(local_size_x = 64) in;
@@ -43,16 +43,17 @@ void main() {
     Span span = spans[seen.triangle];
     int row = int((span.rows & 0xFFFFu) + item - seen.first_item);
 
-    Plane plane = triangle_plane(a, b, c);
-    float densest_eye = densest_eye_columns(plane);
     Slice slice = slice_triangle(a, b, c, row, row_offsets[row]);
-    if (!slice.exists) slice.a = slice.b = SliceEnd(0.0, 0.0);  // without points
-    // From left to right as the densest eye sees it.
-    if (column_from(slice.a, densest_eye) > column_from(slice.b, densest_eye)) {
+    if (!slice.exists) slice.a = slice.b = SliceEnd(0.0, 1.0);  // covers nothing
+    uint facing = draws[corners.w].facing;
+    bool both = (facing & FACING_BOTH) != 0u;
+    // The eye that sees the triangle densest tells best which end is left where it is faced.
+    Plane plane = triangle_plane(a, b, c);
+    float eye = densest_eye_columns(plane);
+    bool rightward = column_from(slice.a, eye) <= column_from(slice.b, eye);
+    if (rightward != faces(facing, eye_side(plane, eye * frame.column_mm))) {
         SliceEnd end = slice.a; slice.a = slice.b; slice.b = end;
     }
-    point_rows[place] = PointRow(
-        slice.a.at_centre, slice.a.toward, slice.b.at_centre, slice.b.toward,
-        plane.normal.x, plane.normal.y, plane.normal.z, plane.at_centre, plane.depths.x, plane.depths.y,
-        densest_eye, span.point_columns, seen.triangle, uint(row), draws[corners.w].facing, row_offsets[row]);
+    point_rows[place] = PointRow(slice.a.at_centre, slice.a.k, slice.b.at_centre, slice.b.k,
+                                 seen.triangle, uint(row) | (both ? DOUBLE_SIDED : 0u));
 }

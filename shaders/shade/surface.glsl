@@ -4,6 +4,7 @@
 #include "common/triangles.glsl"
 #include "common/surface.glsl"
 #include "common/vertices.glsl"
+#include "common/normals.glsl"
 #include "common/shading.glsl"
 #include "layout/BlockWork"
 
@@ -55,8 +56,7 @@ Surface surface_at(uint triangle, int view, int row, int column) {
 
     Surface surface;
     surface.p_world = (world_from_display * vec4(hit.p_display, 1.0)).xyz;
-    surface.normal = mat3(direction_from(world_normals[corners.x]), direction_from(world_normals[corners.y]),
-                          direction_from(world_normals[corners.z])) * hit.weights;
+    surface.normal = mat3(vertex_normal(corners.x), vertex_normal(corners.y), vertex_normal(corners.z)) * hit.weights;
     surface.dp_dx = mat3(world_from_display) * hit.dp_dx;
     surface.dp_dy = mat3(world_from_display) * hit.dp_dy;
     surface.uv0 = Footprint(uv0 * hit.weights, uv0 * hit.weights_dx, uv0 * hit.weights_dy);

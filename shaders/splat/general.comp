@@ -85,11 +85,10 @@ void main() {
     vec3 a = (pixel_from_display * vec4(corners_display[0], 1.0)).xyw;
     vec3 b = (pixel_from_display * vec4(corners_display[1], 1.0)).xyw;
     vec3 c = (pixel_from_display * vec4(corners_display[2], 1.0)).xyw;
-    ivec4 box = footprint_box(corners_display, int(points.row), pixel_from_display);
+    ivec4 box = footprint_box(corners_display, row_of(points), pixel_from_display);
 
-    Plane plane = row_plane(points);
+    uint facing = draws[corners.w].facing;
     uint id = frame.triangle_base + points.triangle;
-    float eye_mm = eyes[view] * frame.column_mm;
     for (int row = max(frame.band_first, box.y); row < min(frame.band_first + frame.band_rows, box.w); row++) {
         int shift = row_shifts[row];
         for (int column = max(0, box.x - shift); column < min(frame.columns, box.z - shift); column++) {
@@ -100,12 +99,9 @@ void main() {
             float determinant = dot(edges, vec3(a.z, b.z, c.z));
             float orientation = sign(determinant);
             float depth = determinant / (edges.x + edges.y + edges.z);
-            if (!faces(points.facing, -determinant) || !(depth >= frame.near_mm)) continue;
+            if (!faces(facing, -determinant) || !(depth >= frame.near_mm)) continue;
             if (!owns(edges.x, b, c, orientation) || !owns(edges.y, c, a, orientation) || !owns(edges.z, a, b, orientation)) continue;
-            if (ALPHA_TESTED != 0) {
-                float x_mm = (float(column) + 0.5 - points.row_offset) * frame.column_mm;
-                if (!alpha_accepts(points.triangle, plane, eye_mm, x_mm, row_centre_mm(row))) continue;
-            }
+            if (ALPHA_TESTED != 0 && !alpha_accepts(points.triangle, eyes[view], row, column)) continue;
             visit(view_pixel(row, view, column), depth, id);
         }
     }
