@@ -5,6 +5,7 @@
 #include "common/textures.glsl"
 
 const float PI = 3.14159265359;
+const vec3 MOST_RADIANCE = vec3(65504.0);  // what half floats hold
 const float SMALLEST_ALPHA = 0.002;  // keeps the specular peak of a mirror finite
 
 struct Surface {
@@ -117,5 +118,5 @@ vec4 shade(Surface surface, vec3 eye_world) {
         vec3 specular = specular_brdf(f0, alpha, n_dot_l, n_dot_v, clamp(dot(normal, halfway), 0.0, 1.0), clamp(dot(view, halfway), 0.0, 1.0));
         radiance += KEY_IRRADIANCE * n_dot_l * (albedo / PI + specular);
     }
-    return vec4(radiance + emitted(surface), base_color_alpha.a);
+    return vec4(min(radiance + emitted(surface), MOST_RADIANCE), base_color_alpha.a);
 }
