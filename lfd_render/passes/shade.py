@@ -13,7 +13,7 @@ from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.placement import Placement, gl_matrix
 from lfd_render.passes.sample import GROUPS_ACROSS
-from lfd_render.passes.splat import ViewBuffers
+from lfd_render.passes.view_buffers import ViewBuffers
 from lfd_render.passes.view_target import Band, ViewTarget
 
 BLOCK = 16  # columns of a view shaded together
@@ -25,10 +25,13 @@ class Shade:
     """ViewBuffers, ViewTarget → ViewTarget.images: each visible pixel is shaded once, where its ray
     meets the triangle that its word names. `blend` lays the nearest blended surface over it."""
 
-    def __init__(self, device: Device, scene: SceneBuffers, target: ViewTarget) -> None:
+    def __init__(
+        self, device: Device, scene: SceneBuffers, target: ViewTarget, word_stride: int
+    ) -> None:
         constants = {
             "BLOCK": BLOCK,
             "GROUP_BLOCKS": GROUP_BLOCKS,
+            "WORD_STRIDE": word_stride,
             "GROUPS_ACROSS": GROUPS_ACROSS,
             **scene.constants(),
         }

@@ -7,15 +7,13 @@ from numpy.typing import NDArray
 
 from lfd_render.display import Rig, ViewGrid
 from lfd_render.gpu.device import Device
-from lfd_render.gpu.layout import CONSTANTS, dtype
+from lfd_render.gpu.layout import dtype
 from lfd_render.gpu.memory import Buffer
-from lfd_render.gpu.programs import Kernel, Samplers, Uniform
+from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.sample import GROUPS_ACROSS, PointCloud
+from lfd_render.passes.view_buffers import ViewBuffers
 from lfd_render.passes.view_target import Band, ViewTarget
-
-_FARTHEST = 0x7F800000  # +∞ as a float's bits
-_DEPTH, _WINNER = 0, 1
 
 
 def view_lanes(views: int) -> int:
@@ -23,40 +21,25 @@ def view_lanes(views: int) -> int:
     return min(64, -(-views // 8) * 8)
 
 
-class ViewBuffers:
-    """The winner of each view pixel of a band, [row of the band, view, column]: depths as float
-    bits, words as global triangle ids or NO_TRIANGLE."""
-
-    def __init__(self, device: Device, target: ViewTarget) -> None:
-        self.depths = Buffer(device, "view buffers", 4 * target.band_pixels)
-        self.words = Buffer(device, "view buffers", 4 * target.band_pixels)
-
-    def clear(self) -> None:
-        """Set all pixels to nothing, infinitely far."""
-        self.depths.fill(_FARTHEST)
-        self.clear_words()
-
-    def clear_words(self) -> None:
-        """Forget the winners and keep the depths, for surfaces that lie over what was drawn."""
-        self.words.fill(CONSTANTS["NO_TRIANGLE"])
-
-    def release(self) -> None:
-        """Free the buffers."""
-        self.depths.release()
-        self.words.release()
-
-
 class Splat:
     """PointCloud, ViewTarget → ViewBuffers. Nearest depth wins; at equal depth the smaller id.
 
-    Two passes of 32-bit atomics over all batches, the portable path: first `depths`, then
-    `winners`. The result depends neither on the order of points nor on batches.
+    `steps` passes over all points: one of 64-bit atomics, or two of 32-bit ones, depths first. The
+    result depends neither on the order of points nor on batches, and is the same for both.
     """
 
     def __init__(
-        self, device: Device, scene: SceneBuffers, target: ViewTarget, *, general: bool = False
+        self,
+        device: Device,
+        scene: SceneBuffers,
+        target: ViewTarget,
+        *,
+        general: bool = False,
+        int64: bool = False,
     ) -> None:
         """general: by each view's matrix instead of the shear that parallel views share."""
+        self.steps = range(1 if int64 else 2)
+        path = f"splat/{'general' if general else 'shear'}{'_int64' if int64 else ''}.comp"
         constants = {
             "VIEW_LANES": view_lanes(target.rig.views),
             "GROUPS_ACROSS": GROUPS_ACROSS,
@@ -72,50 +55,42 @@ class Splat:
             }
         self._kernels = {
             (step, masked): Kernel(
-                device,
-                "splat/general.comp" if general else "splat/shear.comp",
-                {**constants, "STEP": step, "ALPHA_TESTED": int(masked)},
+                device, path, {**constants, "STEP": step, "ALPHA_TESTED": int(masked)}
             )
             for masked in sorted({batch.alpha_mode == "mask" for batch in scene.batches})
-            for step in (_DEPTH, _WINNER)
+            for step in self.steps
         }
 
-    def depths(
-        self, batch: Batch, points: PointCloud, window: int, band: Band, views: ViewBuffers
+    def __call__(
+        self,
+        step: int,
+        batch: Batch,
+        points: PointCloud,
+        *,
+        window: int,
+        band: Band,
+        views: ViewBuffers,
     ) -> None:
-        """Lower each pixel's depth to the nearest of a window of points."""
-        kernel = self._kernels[_DEPTH, batch.alpha_mode == "mask"]
-        kernel.set(self._buffers(batch, points, band, views), *self._others(window))
+        """Splat one window of points; every window and batch has had its step before the next."""
+        kernel = self._kernels[step, batch.alpha_mode == "mask"]
+        kernel.set(
+            {
+                **batch.geometry(),
+                **batch.attributes(),
+                **self._scene.materials_of(),
+                **self._projection,
+                **views.blocks(),
+                "Draws": self._scene.draws,
+                "FrameBlock": band.frame(batch),
+                "PointRows": points.rows,
+                "WorkBlock": points.work,
+                "Eyes": band.target.eyes,
+                "RowOffsets": band.target.row_offsets,
+            },
+            {"window": window},
+            self._scene.samplers(),
+        )
         kernel.run_indirect(points.work, window * dtype("Work").itemsize)
-
-    def winners(
-        self, batch: Batch, points: PointCloud, window: int, band: Band, views: ViewBuffers
-    ) -> None:
-        """Set each pixel's word to the smallest id at its depth. All depths come first."""
-        kernel = self._kernels[_WINNER, batch.alpha_mode == "mask"]
-        kernel.set(self._buffers(batch, points, band, views), *self._others(window))
-        kernel.run_indirect(points.work, window * dtype("Work").itemsize)
-
-    def _others(self, window: int) -> tuple[dict[str, Uniform], Samplers]:
-        return {"window": window}, self._scene.samplers()
-
-    def _buffers(
-        self, batch: Batch, points: PointCloud, band: Band, views: ViewBuffers
-    ) -> dict[str, Buffer]:
-        return {
-            **batch.geometry(),
-            **batch.attributes(),
-            **self._scene.materials_of(),
-            "Draws": self._scene.draws,
-            "FrameBlock": band.frame(batch),
-            "PointRows": points.rows,
-            "WorkBlock": points.work,
-            "Eyes": band.target.eyes,
-            "RowOffsets": band.target.row_offsets,
-            **self._projection,
-            "Depths": views.depths,
-            "Words": views.words,
-        }
 
     def release(self) -> None:
         """Free the kernels."""

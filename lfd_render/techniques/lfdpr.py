@@ -8,8 +8,9 @@ from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.placement import Placement
 from lfd_render.passes.sample import PointCloud, Sample
 from lfd_render.passes.shade import Shade
-from lfd_render.passes.splat import Splat, ViewBuffers, view_lanes
+from lfd_render.passes.splat import Splat, view_lanes
 from lfd_render.passes.transform import Transform
+from lfd_render.passes.view_buffers import INT64_ATOMICS, make_view_buffers
 from lfd_render.passes.view_target import Band, ViewTarget
 
 
@@ -27,8 +28,14 @@ class Lfdpr:
         *,
         stochastic_culling: bool = False,
         general: bool = False,
+        int64: bool | None = None,
     ) -> None:
-        """general: splat by each view's matrix instead of the shear that parallel views share."""
+        """general: splat by each view's matrix instead of the shear that parallel views share.
+
+        int64: find winners by 64-bit atomics; None does where the device has them.
+        """
+        if int64 is None:
+            int64 = INT64_ATOMICS in device.info.extensions
         lanes = view_lanes(target.rig.views)
         self.target = target
         self._scene = scene
@@ -36,10 +43,10 @@ class Lfdpr:
         self._sample = Sample(
             device, scene, lanes, stochastic_culling=stochastic_culling, whole_rows=general
         )
-        self._splat = Splat(device, scene, target, general=general)
-        self._shade = Shade(device, scene, target)
+        self._splat = Splat(device, scene, target, general=general, int64=int64)
+        self._views = make_view_buffers(device, target, int64=int64)
+        self._shade = Shade(device, scene, target, self._views.word_stride)
         self._points = [self._sample.allocate(batch) for batch in scene.batches]
-        self._views = ViewBuffers(device, target)
 
     def begin(self, placement: Placement, clock: StageClock) -> None:
         """Place the scene and transform its vertices."""
@@ -79,12 +86,12 @@ class Lfdpr:
                 self._shade.blend(batches, band, self._views, self._placement)
 
     def _find_winners(self, batches: list[tuple[Batch, PointCloud]], band: Band) -> None:
-        for splat in (self._splat.depths, self._splat.winners):
+        for step in self._splat.steps:
             for batch, points in batches:
                 for window in range(points.windows):
                     if points.windows > 1:
                         self._sample.rows(batch, points, band, window)
-                    splat(batch, points, window, band, self._views)
+                    self._splat(step, batch, points, window=window, band=band, views=self._views)
 
     def complete(self) -> bool:
         """Whether the windows held all points since the last call; if not, they do from now on."""

@@ -23,7 +23,7 @@ void main() {
     bool any_here = false;
     // Background is no triangle of any batch, since ids end far below it.
     for (uint column = first; column < end; column++)
-        any_here = any_here || words[line * uint(frame.columns) + column] - frame.triangle_base < frame.triangles;
+        any_here = any_here || words[WORD_STRIDE * (line * uint(frame.columns) + column)] - frame.triangle_base < frame.triangles;
     if (!any_here) return;
     uint place = atomicAdd(block_work.blocks, 1u), group = place / GROUP_BLOCKS;
     blocks[place] = block;

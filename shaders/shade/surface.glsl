@@ -8,6 +8,7 @@
 #include "common/shading.glsl"
 #include "layout/BlockWork"
 
+// Winners, each WORD_STRIDE words from the one before.
 layout(std430) readonly restrict buffer Words { uint words[]; };
 layout(std430) readonly restrict buffer Blocks { uint blocks[]; };
 layout(std430) readonly restrict buffer BlockWorkBlock { BlockWork block_work; };
@@ -32,7 +33,7 @@ Visible visible_pixel() {
     seen.pixel = ivec3(column, int(line) / frame.views, int(line) % frame.views);
     seen.nothing = place >= block_work.blocks || column >= frame.columns;
     if (seen.nothing) return seen;
-    seen.triangle = words[line * uint(frame.columns) + uint(column)] - frame.triangle_base;
+    seen.triangle = words[WORD_STRIDE * (line * uint(frame.columns) + uint(column))] - frame.triangle_base;
     seen.nothing = seen.triangle >= frame.triangles;
     return seen;
 }

@@ -1,0 +1,102 @@
+"""The winner of each view pixel of a band, [row of the band, view, column].
+
+Two layouts of the same thing, by what the device's atomics can do.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from lfd_render.gpu.device import Device
+from lfd_render.gpu.layout import CONSTANTS
+from lfd_render.gpu.memory import Buffer
+from lfd_render.gpu.programs import Kernel
+from lfd_render.passes.sample import GROUPS_ACROSS
+from lfd_render.passes.view_target import ViewTarget
+
+INT64_ATOMICS = "GL_NV_shader_atomic_int64"
+_FARTHEST = 0x7F800000  # +∞ as a float's bits
+_GROUP = 64  # local_size_x of splat/forget.comp
+
+
+class ViewBuffers(Protocol):
+    """Winners: global triangle ids or NO_TRIANGLE, each `word_stride` words of `words` apart."""
+
+    words: Buffer
+    word_stride: int
+
+    def blocks(self) -> dict[str, Buffer]:
+        """What splatting writes, by block name."""
+
+    def clear(self) -> None:
+        """Set all pixels to nothing, infinitely far."""
+
+    def clear_words(self) -> None:
+        """Forget the winners and keep the depths, for surfaces that lie over what was drawn."""
+
+    def release(self) -> None:
+        """Free the buffers."""
+
+
+class SplitViewBuffers:
+    """Depths as float bits, and ids, apart: for two passes of 32-bit atomics."""
+
+    word_stride = 1
+
+    def __init__(self, device: Device, target: ViewTarget) -> None:
+        self.depths = Buffer(device, "view buffers", 4 * target.band_pixels)
+        self.words = Buffer(device, "view buffers", 4 * target.band_pixels)
+
+    def blocks(self) -> dict[str, Buffer]:
+        """What splatting writes, by block name."""
+        return {"Depths": self.depths, "Words": self.words}
+
+    def clear(self) -> None:
+        """Set all pixels to nothing, infinitely far."""
+        self.depths.fill(_FARTHEST)
+        self.clear_words()
+
+    def clear_words(self) -> None:
+        """Forget the winners and keep the depths."""
+        self.words.fill(CONSTANTS["NO_TRIANGLE"])
+
+    def release(self) -> None:
+        """Free the buffers."""
+        self.depths.release()
+        self.words.release()
+
+
+class PackedViewBuffers:
+    """Depth above id in one 64-bit word: for one pass of 64-bit atomics."""
+
+    word_stride = 2
+
+    def __init__(self, device: Device, target: ViewTarget) -> None:
+        self._pixels = target.band_pixels
+        self.words = Buffer(device, "view buffers", 8 * target.band_pixels)
+        self._forget = Kernel(device, "splat/forget.comp")
+
+    def blocks(self) -> dict[str, Buffer]:
+        """What splatting writes, by block name."""
+        return {"Winners": self.words}
+
+    def clear(self) -> None:
+        """Set all pixels to nothing, farther than any depth."""
+        self.words.fill(CONSTANTS["NO_TRIANGLE"])
+
+    def clear_words(self) -> None:
+        """Forget the winners and keep the depths."""
+        groups = -(-self._pixels // _GROUP)
+        across = min(groups, GROUPS_ACROSS)
+        self._forget.set({"Winners": self.words}, {"pixels": self._pixels, "groups_across": across})
+        self._forget.run((across, -(-groups // across), 1))
+
+    def release(self) -> None:
+        """Free the buffer and the kernel."""
+        self.words.release()
+        self._forget.release()
+
+
+def make_view_buffers(device: Device, target: ViewTarget, *, int64: bool) -> ViewBuffers:
+    """The layout that 64-bit atomics, or their lack, ask for."""
+    return (PackedViewBuffers if int64 else SplitViewBuffers)(device, target)

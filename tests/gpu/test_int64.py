@@ -1,0 +1,87 @@
+"""64-bit atomics find the same winners as two passes of 32-bit ones, to the bit.
+
+The device is zink on lavapipe, whose OpenGL has NV_shader_atomic_int64, in a process of its own.
+"""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+COMPARE = """
+import json
+import numpy as np
+from lfd_render import DisplayProfile, Scene
+from lfd_render.display import ViewGrid
+from lfd_render.gpu.clock import StageClock
+from lfd_render.gpu.device import Device
+from lfd_render.gpu.scene_buffers import SceneBuffers
+from lfd_render.passes.placement import Placement
+from lfd_render.passes.view_buffers import INT64_ATOMICS, PackedViewBuffers
+from lfd_render.passes.view_target import ViewTarget
+from lfd_render.renderer import camera_for
+from lfd_render.scene import Instance, Material
+from lfd_render.techniques import Lfdpr
+import dataclasses
+
+display = DisplayProfile.load("gavane-2024-tilted-4k")
+device = Device.open("auto")
+spheres = Scene.load("builtin:spheres?triangles=4000")
+# Every third material blends and every third is cut by its alpha, so that all passes run.
+modes = ("opaque", "blend", "mask")
+materials = tuple(
+    dataclasses.replace(m, alpha_mode=modes[i % 3], base_color=(*m.base_color[:3], 0.6))
+    for i, m in enumerate(spheres.materials)
+)
+scene = dataclasses.replace(spheres, materials=materials)
+rig, grid = display.rig(11), ViewGrid.lens(display, 60)
+placement = Placement(camera_for(scene, display).display_from_world(display.size_mm), (0, 0, 0))
+
+def frame(int64, general):
+    buffers = SceneBuffers(device, scene)
+    target = ViewTarget(device, rig, grid, buffers.batches)
+    technique = Lfdpr(device, buffers, target, int64=int64, general=general)
+    clock = StageClock(device)
+    technique.begin(placement, clock)
+    technique.warm_up(clock)
+    technique.render(target.bands[0], clock)
+    images = target.images.read(np.float16, 0x140B)
+    words = technique._views.words.read(np.uint32)[:: technique._views.word_stride]
+    packed = isinstance(technique._views, PackedViewBuffers)
+    technique.release()
+    buffers.release()
+    device.check()
+    return packed, words, images.view(np.uint16)
+
+report = {"has int64": INT64_ATOMICS in device.info.extensions, "renderer": device.name}
+for general in (False, True):
+    (one, words64, images64), (two, words32, images32) = (frame(i, general) for i in (None, False))
+    report[f"general {general}"] = {
+        "packed": [one, two],
+        "visible": int((words32 != 0xFFFFFFFF).sum()),
+        "different words": int((words64 != words32).sum()),
+        "different images": int((images64 != images32).sum()),
+    }
+print(json.dumps(report))
+"""
+
+
+@pytest.mark.needs("zink")
+@pytest.mark.shows("64-bit atomics, tested through zink on lavapipe, give the same bits")
+def test_both_splat_paths_give_the_same_bits(zink: dict[str, str]) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", COMPARE], env=zink, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)
+    assert report["has int64"]
+    assert "zink" in report["renderer"]
+    for general in (False, True):
+        found = report[f"general {general}"]
+        assert found["packed"] == [
+            True,
+            False,
+        ]  # what the device offers is used, and can be refused
+        assert found["visible"] > 1000
+        assert found["different words"] == found["different images"] == 0
