@@ -14,6 +14,7 @@ from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.view_target import Band
 
 SEGMENT = 64  # triangles a thread of the prefix sum takes
+GROUP_ROWS = 4  # rows of points a work group of the splatter takes
 GROUPS_ACROSS = 32768  # work groups along x before y grows
 MOST_WINDOW_ITEMS = 1 << 21  # rows of points that one buffer holds: 48 MiB
 _HEADROOM = 1.25  # of a window over the items found, so that a moving scene rarely outgrows it
@@ -69,7 +70,11 @@ class Sample:
         self._device = device
         self._scene = scene
         self._view_lanes = view_lanes
-        constants = {"SEGMENT": SEGMENT, "GROUPS_ACROSS": GROUPS_ACROSS}
+        constants = {
+            "SEGMENT": SEGMENT,
+            "GROUP_ROWS": GROUP_ROWS,
+            "GROUPS_ACROSS": GROUPS_ACROSS,
+        }
         self._span = Kernel(
             device,
             "sample/span.comp",

@@ -11,7 +11,7 @@ from lfd_render.gpu.layout import dtype
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
-from lfd_render.passes.sample import GROUPS_ACROSS, PointCloud
+from lfd_render.passes.sample import GROUP_ROWS, GROUPS_ACROSS, PointCloud
 from lfd_render.passes.view_buffers import ViewBuffers
 from lfd_render.passes.view_target import Band, ViewTarget
 
@@ -42,6 +42,7 @@ class Splat:
         path = f"splat/{'general' if general else 'shear'}{'_int64' if int64 else ''}.comp"
         constants = {
             "VIEW_LANES": view_lanes(target.rig.views),
+            "GROUP_ROWS": GROUP_ROWS,
             "GROUPS_ACROSS": GROUPS_ACROSS,
             **scene.constants(),
         }

@@ -48,9 +48,9 @@ void main() {
         atomicMax(most_items, total.y);
         for (uint w = 0u; w < windows; w++) {
             uint begin = min(w * window_items, total.y), items = min(window_items, total.y - begin);
-            uint groups = (items + 63u) / 64u;
+            uint groups = (items + 63u) / 64u, splats = (items + GROUP_ROWS - 1u) / GROUP_ROWS;
             work[w] = Work(
-                min(items, GROUPS_ACROSS), (items + GROUPS_ACROSS - 1u) / GROUPS_ACROSS, view_blocks,
+                min(splats, GROUPS_ACROSS), (splats + GROUPS_ACROSS - 1u) / GROUPS_ACROSS, view_blocks,
                 min(groups, GROUPS_ACROSS), (groups + GROUPS_ACROSS - 1u) / GROUPS_ACROSS, 1u,
                 begin, items, total.x);
         }

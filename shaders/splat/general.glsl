@@ -1,5 +1,5 @@
 // Splat points into views of any projection: the path for rigs that are not parallel, and the check on
-// the shear identity. A work group takes one lattice row of a triangle; its footprint in a view is the
+// the shear identity. The footprint of a triangle's lattice row in a view is the
 // box of the triangle's part between the row's upper and lower plane, and of the box's pixels those
 // inside the triangle are kept (Gavane and Watson 2023, section 3.3), by 2D homogeneous edge functions
 // (Olano and Greer 1997), so that nothing needs clipping.
@@ -71,11 +71,7 @@ bool owns(float value, vec3 p, vec3 q, float orientation) {
     return right > 0.0 || (right == 0.0 && down > 0.0);
 }
 
-void main() {
-    uint place = gl_WorkGroupID.y * GROUPS_ACROSS + gl_WorkGroupID.x;
-    int view = int(gl_WorkGroupID.z * VIEW_LANES + gl_LocalInvocationID.x);
-    PointRow points = point_rows[place];
-    if (place >= work[window].items || view >= frame.views) return;
+void splat_row(PointRow points, int view) {
     uvec4 corners = triangles[points.triangle];
     mat3 corners_display = mat3(display_positions[corners.x].xyz, display_positions[corners.y].xyz, display_positions[corners.z].xyz);
     mat4 pixel_from_display = pixel_matrices[view];
@@ -102,4 +98,12 @@ void main() {
             visit(view_pixel(row, view, column), depth, id);
         }
     }
+}
+
+void main() {
+    uint first = (gl_WorkGroupID.y * GROUPS_ACROSS + gl_WorkGroupID.x) * GROUP_ROWS;
+    int view = int(gl_WorkGroupID.z * VIEW_LANES + gl_LocalInvocationID.x);
+    if (view >= frame.views) return;
+    for (uint place = first; place < min(first + GROUP_ROWS, work[window].items); place++)
+        splat_row(point_rows[place], view);
 }
