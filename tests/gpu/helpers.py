@@ -75,7 +75,7 @@ def random_grid(rng: np.random.Generator, name: str) -> tuple[DisplayProfile, Vi
 
 
 def exact_views() -> tuple[Rig, ViewGrid]:
-    """Eyes, window and pixels at powers of two, where float32 computes corners and edges exactly."""
+    """Eyes, window and pixels at powers of two: float32 computes corners and edges exactly."""
     grid = ViewGrid(
         rows=32,
         columns=64,
