@@ -7,17 +7,19 @@ only one that talks to moderngl; passes see `Device`, `Kernel`, `RasterProgram`,
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import glcontext
 import moderngl
 
-from lfd_render.errors import GpuError
-from lfd_render.gpu.memory import Ledger
-from lfd_render.gpu.raw import ERRORS, RawGl
+from lfd_render.errors import GpuError, ResourceError
+from lfd_render.gpu.memory import Ledger, Owned
+from lfd_render.gpu.raw import ERRORS, MAX_COMPUTE_SHADER_STORAGE_BLOCKS, OUT_OF_MEMORY, RawGl
 
 REQUIRED_VERSION = 450
+STORAGE_BLOCKS = 16  # of the largest shader; OpenGL promises 8, Mesa offers 16
 SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "lavapipe")
 INSTALL_HINT = (
     "install the GL libraries (Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri) "
@@ -41,6 +43,7 @@ class DeviceInfo:
     max_array_layers: int
     max_texture_size: int
     max_groups: int
+    max_storage_blocks: int  # of a compute shader
 
 
 class Device:
@@ -52,8 +55,14 @@ class Device:
         self.context = moderngl.create_context(context=loader)
         self.raw = RawGl(loader)
         self.ledger = Ledger()
-        self.info = _describe(self.context, egl_index)
-        self._closed = False
+        self.owned: dict[Owned, None] = {}  # in the order they were made
+        self.info = _describe(self.context, self.raw, egl_index)
+        self.closed = False
+        if self.info.max_storage_blocks < STORAGE_BLOCKS:
+            raise GpuError(
+                f"device {self.name}: a compute shader may use {self.info.max_storage_blocks} "
+                f"storage blocks and this renderer needs {STORAGE_BLOCKS}; use --device software"
+            )
 
     @classmethod
     def open(cls, choice: str = "auto") -> Device:
@@ -84,6 +93,8 @@ class Device:
 
     def activate(self) -> None:
         """Make this the thread's current context. Whoever has several calls it before each use."""
+        if self.closed:
+            raise GpuError("device: it is closed; open another Device or Renderer")
         self.context.__enter__()  # type: ignore[no-untyped-call]  # moderngl types its methods only
 
     def finish(self) -> None:
@@ -97,17 +108,36 @@ class Device:
     def check(self) -> None:
         """Raise GpuError when OpenGL has recorded an error since the last check."""
         code = self.raw.glGetError()
+        if code == OUT_OF_MEMORY:
+            raise ResourceError(
+                f"OpenGL on {self.name}: out of memory; use fewer or smaller views or textures"
+            )
         if code:
             raise GpuError(f"OpenGL on {self.name} reports {ERRORS.get(code, hex(code))}")
 
+    @contextmanager
+    def undoing(self) -> Iterator[None]:
+        """Release what was made inside when it ends in an error."""
+        before = set(self.owned)
+        try:
+            yield
+        except BaseException:
+            for thing in reversed(list(self.owned)):
+                if thing not in before:
+                    thing.release()
+            raise
+
     def close(self) -> None:
         """Free everything and the context. Calling it again does nothing."""
-        if not self._closed:
-            self._closed = True
+        if not self.closed:
+            self.activate()
+            for thing in reversed(list(self.owned)):
+                thing.release()
+            self.closed = True
             self.context.release()
 
 
-def _describe(context: moderngl.Context, egl_index: int) -> DeviceInfo:
+def _describe(context: moderngl.Context, raw: RawGl, egl_index: int) -> DeviceInfo:
     info = context.info
     renderer = str(info["GL_RENDERER"])
     return DeviceInfo(
@@ -122,6 +152,7 @@ def _describe(context: moderngl.Context, egl_index: int) -> DeviceInfo:
         max_array_layers=int(info["GL_MAX_ARRAY_TEXTURE_LAYERS"]),
         max_texture_size=int(info["GL_MAX_TEXTURE_SIZE"]),
         max_groups=int(info["GL_MAX_COMPUTE_WORK_GROUP_COUNT"][0]),
+        max_storage_blocks=raw.integer(MAX_COMPUTE_SHADER_STORAGE_BLOCKS),
     )
 
 

@@ -6,25 +6,27 @@ moderngl attaches neither a layer of an immutable array nor layered depth, so th
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.gpu import raw as gl
-from lfd_render.gpu.memory import Buffer, TextureArray
+from lfd_render.gpu.memory import Buffer, Owned, TextureArray
 from lfd_render.gpu.programs import RasterProgram
 
 if TYPE_CHECKING:
     from lfd_render.gpu.device import Device
 
 
-class LayerTarget:
+class LayerTarget(Owned):
     """A framebuffer over one layer at a time of a texture array."""
 
     def __init__(self, device: Device, texture: TextureArray, *, depth: bool) -> None:
+        super().__init__(device)
         self.texture = texture
-        self._device = device
         self._depth = ctypes.c_uint()
         self._name = ctypes.c_uint()
         raw = device.raw
@@ -67,8 +69,7 @@ class LayerTarget:
         raw.glReadPixels(0, 0, width, height, gl.RGB, gl_type, pixels.ctypes.data)
         return pixels
 
-    def release(self) -> None:
-        """Free the framebuffer and its depth buffer, not the texture."""
+    def _free(self) -> None:
         raw = self._device.raw
         raw.glDeleteFramebuffers(1, ctypes.byref(self._name))
         if self._depth.value:
@@ -76,27 +77,75 @@ class LayerTarget:
             self._device.ledger.add("depth", -4 * self.texture.width * self.texture.height)
 
 
-class IndexedDraws:
+@contextmanager
+def rasterising(device: Device) -> Iterator[None]:
+    """Depth tests and clips at both sides of the window inside; off again whatever happens."""
+    raw = device.raw
+    raw.glEnable(gl.DEPTH_TEST)
+    raw.glDepthFunc(gl.LESS)
+    raw.glEnable(gl.CLIP_DISTANCE0)
+    raw.glEnable(gl.CLIP_DISTANCE0 + 1)
+    raw.glCullFace(gl.BACK)
+    try:
+        yield
+    finally:
+        raw.glDisable(gl.CLIP_DISTANCE0)
+        raw.glDisable(gl.CLIP_DISTANCE0 + 1)
+        raw.glDisable(gl.CULL_FACE)
+        raw.glDisable(gl.DEPTH_TEST)
+
+
+@contextmanager
+def depth_only(device: Device) -> Iterator[None]:
+    """Draws inside write no colour."""
+    device.raw.glColorMask(0, 0, 0, 0)
+    try:
+        yield
+    finally:
+        device.raw.glColorMask(1, 1, 1, 1)
+
+
+@contextmanager
+def blending_at_equal_depth(device: Device) -> Iterator[None]:
+    """Draws inside lie over what is drawn, by their alpha, where their depth is the nearest."""
+    raw = device.raw
+    raw.glDepthFunc(gl.EQUAL)
+    raw.glEnable(gl.BLEND)
+    raw.glBlendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA)
+    try:
+        yield
+    finally:
+        raw.glDisable(gl.BLEND)
+        raw.glDepthFunc(gl.LESS)
+
+
+def face_culling(device: Device, *, double_sided: bool, mirrored: bool) -> None:
+    """Which side the next draws show. Row 0 at the raster's bottom turns windings over."""
+    raw = device.raw
+    (raw.glDisable if double_sided else raw.glEnable)(gl.CULL_FACE)
+    raw.glFrontFace(gl.CCW if mirrored else gl.CW)
+
+
+class IndexedDraws(Owned):
     """Triangles by an index buffer; vertices are pulled from storage blocks by gl_VertexID."""
 
     def __init__(self, device: Device, program: RasterProgram, indices: Buffer) -> None:
-        self._device = device
+        super().__init__(device)
         self._vao = device.context.vertex_array(program.glo, [], index_buffer=indices.glo)
 
     def draw(self, first: int, count: int) -> None:
         """Draw `count` triangles from the `first` on."""
         self._vao.render(self._device.triangles_mode, vertices=3 * count, first=3 * first)
 
-    def release(self) -> None:
-        """Free the vertex array."""
+    def _free(self) -> None:
         self._vao.release()
 
 
-class ScreenDraw:
+class ScreenDraw(Owned):
     """A program run once for each pixel of the target in use."""
 
     def __init__(self, device: Device, program: RasterProgram) -> None:
-        self._device = device
+        super().__init__(device)
         self._vao = device.context.vertex_array(program.glo, [])
 
     def draw(self, first_row: int, rows: int, width: int) -> None:
@@ -109,6 +158,5 @@ class ScreenDraw:
         self._vao.render(self._device.triangles_mode, vertices=3)
         raw.glDisable(gl.SCISSOR_TEST)
 
-    def release(self) -> None:
-        """Free the vertex array."""
+    def _free(self) -> None:
         self._vao.release()

@@ -48,7 +48,7 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("uint", "emissive_b_cutoff"),  # 2 × half: blue, alpha cutoff
         ("uint", "metallic_roughness"),  # 2 × unorm16
         ("uint", "normal_occlusion"),  # 2 × half: normal scale, occlusion strength
-        ("uint", "flags"),  # ALPHA_*, and UNLIT
+        ("uint", "flags"),  # UNLIT
         # Most texels any texture lays on a unit of texture area, by coordinate set (equation 1).
         ("float", "texels_uv0"),
         ("float", "texels_uv1"),
@@ -108,6 +108,8 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("float", "a_k"),
         ("float", "b_column"),
         ("float", "b_k"),
+        ("float", "a_depth_k"),  # D/d at the ends by the triangle's plane: edges place pixels and
+        ("float", "b_depth_k"),  # must agree between triangles, depth must be the triangle's own
         ("uint", "triangle"),  # within its batch
         ("uint", "row_sides"),  # row, and DOUBLE_SIDED above it
     ),
@@ -121,17 +123,12 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
 }
 
 CONSTANTS: dict[str, int] = {
-    "FACING_FRONT": 0,  # counter-clockwise triangles are seen
-    "FACING_MIRRORED": 1,  # the placement mirrors, so clockwise ones are
+    "FACING_MIRRORED": 1,  # bit: the placement mirrors, so clockwise triangles are seen
     "FACING_BOTH": 2,  # bit: double-sided
     "TEXTURE_ROLES": len(TEXTURE_ROLES),
     "NO_TRIANGLE": 0xFFFFFFFF,  # the word of a view pixel that shows the background
     "DOUBLE_SIDED": 1 << 16,
-    "ALPHA_OPAQUE": 0,
-    "ALPHA_MASK": 1,
-    "ALPHA_BLEND": 2,
-    "ALPHA_BITS": 3,  # mask of the three above
-    "UNLIT": 4,
+    "UNLIT": 1,  # flag of a material
     # A texture slot is one word: group, then layer, then coordinate set.
     "SLOT_GROUP_BITS": 8,
     "SLOT_LAYER_BITS": 16,

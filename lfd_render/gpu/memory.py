@@ -1,4 +1,4 @@
-"""Device memory: buffers, texture arrays, and the ledger that counts every byte of them."""
+"""Device memory: buffers, textures, and the ledger that counts every byte of them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import ctypes
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import moderngl
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
@@ -14,6 +15,23 @@ from lfd_render.gpu import raw as gl
 
 if TYPE_CHECKING:
     from lfd_render.gpu.device import Device
+
+
+class Owned:
+    """Something that lives on a device, which knows it until it is released."""
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+        device.owned[self] = None
+
+    def release(self) -> None:
+        """Give it back; calling it again does nothing. It must not be used afterwards."""
+        if self in self._device.owned:
+            del self._device.owned[self]
+            self._free()
+
+    def _free(self) -> None:
+        raise NotImplementedError
 
 
 class Ledger:
@@ -28,6 +46,10 @@ class Ledger:
         """Bytes allocated now."""
         return sum(self.by_label.values())
 
+    def restart_peak(self) -> None:
+        """Forget past peaks: the peak is what is allocated now."""
+        self.peak = self.total
+
     def add(self, label: str, size: int) -> None:
         """Count an allocation (negative: a release)."""
         self.by_label[label] = self.by_label.get(label, 0) + size
@@ -36,7 +58,7 @@ class Ledger:
         self.peak = max(self.peak, self.total)
 
 
-class Buffer:
+class Buffer(Owned):
     """A storage buffer. Sizes are in bytes; contents travel as numpy arrays."""
 
     def __init__(self, device: Device, label: str, size: int, data: bytes | None = None) -> None:
@@ -48,8 +70,15 @@ class Buffer:
             )
         self.label = label
         self.size = max(4, size)
-        self._device = device
-        self.glo = device.context.buffer(data) if data else device.context.buffer(reserve=self.size)
+        try:
+            context = device.context
+            self.glo = context.buffer(data) if data else context.buffer(reserve=self.size)
+        except moderngl.Error as error:
+            raise ResourceError(
+                f"device buffer '{label}': {size} bytes cannot be allocated on {device.name} "
+                f"({error}); use fewer or smaller views, or a smaller scene"
+            ) from None
+        super().__init__(device)
         device.ledger.add(label, self.size)
 
     @classmethod
@@ -78,8 +107,7 @@ class Buffer:
             ctypes.byref(ctypes.c_uint(word)),
         )
 
-    def release(self) -> None:
-        """Give the memory back. The buffer must not be used afterwards."""
+    def _free(self) -> None:
         self._device.ledger.add(self.label, -self.size)
         self.glo.release()
 
@@ -87,7 +115,7 @@ class Buffer:
 _BYTES_PER_TEXEL = {gl.RGBA8: 4, gl.SRGB8_ALPHA8: 4, gl.RGBA16F: 8}
 
 
-class TextureArray:
+class TextureArray(Owned):
     """A 2D array texture with immutable storage: [layer, y, x], row 0 as uploaded."""
 
     def __init__(
@@ -105,21 +133,22 @@ class TextureArray:
         if max(width, height) > info.max_texture_size or layers > info.max_array_layers:
             raise ResourceError(
                 f"texture '{label}': {width}×{height} with {layers} layers exceeds the limits of "
-                f"{device.name} ({info.max_texture_size} texels, {info.max_array_layers} layers)"
+                f"{device.name} ({info.max_texture_size} texels, {info.max_array_layers} layers); "
+                "use smaller or fewer pictures"
             )
         self.label = label
         self.width, self.height, self.layers, self.levels = width, height, layers, levels
         self.internal_format = internal_format
-        self._device = device
+        super().__init__(device)
         name = ctypes.c_uint()
         device.raw.glCreateTextures(gl.TEXTURE_2D_ARRAY, 1, ctypes.byref(name))
         self.name = int(name.value)
-        device.raw.glTextureStorage3D(self.name, levels, internal_format, width, height, layers)
-        device.check()
         self.size = sum(
             max(1, width >> level) * max(1, height >> level) for level in range(levels)
         ) * (layers * _BYTES_PER_TEXEL[internal_format])
         device.ledger.add(label, self.size)
+        device.raw.glTextureStorage3D(self.name, levels, internal_format, width, height, layers)
+        device.check()
 
     def upload(self, layer: int, pixels: NDArray[np.uint8]) -> None:
         """Set level 0 of a layer from uint8 [y, x, 4]."""
@@ -164,22 +193,28 @@ class TextureArray:
         )
         return pixels
 
-    def release(self) -> None:
-        """Give the memory back. The texture must not be used afterwards."""
+    def _free(self) -> None:
         self._device.ledger.add(self.label, -self.size)
         self._device.raw.glDeleteTextures(1, ctypes.byref(ctypes.c_uint(self.name)))
 
 
-class TableTexture:
+class TableTexture(Owned):
     """A table of four 32-bit words an entry, read by texelFetch: software devices gather from it
     faster than from storage blocks."""
 
     def __init__(self, device: Device, label: str, words: NDArray[np.uint32]) -> None:
         """words: uint32 [n, 4], n at most the device's texture size."""
         assert words.shape == (len(words), 4)
+        limit = device.info.max_texture_size
+        if len(words) > limit:
+            raise ResourceError(
+                f"table '{label}': {len(words)} entries exceed the {limit} texels of "
+                f"{device.name}; use a display of fewer pixels a side"
+            )
         self.label = label
         self.size = words.nbytes
-        self._device = device
+        super().__init__(device)
+        device.ledger.add(label, self.size)
         name = ctypes.c_uint()
         raw = device.raw
         raw.glCreateTextures(gl.TEXTURE_2D, 1, ctypes.byref(name))
@@ -192,13 +227,11 @@ class TableTexture:
         raw.glTextureParameteri(self.name, gl.TEXTURE_MIN_FILTER, gl.NEAREST)
         raw.glTextureParameteri(self.name, gl.TEXTURE_MAG_FILTER, gl.NEAREST)
         device.check()
-        device.ledger.add(label, self.size)
 
     def bind(self, unit: int) -> None:
         """Make the table what samplers of this unit read."""
         self._device.raw.glBindTextureUnit(unit, self.name)
 
-    def release(self) -> None:
-        """Give the memory back. The table must not be used afterwards."""
+    def _free(self) -> None:
         self._device.ledger.add(self.label, -self.size)
         self._device.raw.glDeleteTextures(1, ctypes.byref(ctypes.c_uint(self.name)))

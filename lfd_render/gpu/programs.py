@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import moderngl
 
 from lfd_render.errors import GpuError
-from lfd_render.gpu.memory import Buffer, TableTexture, TextureArray
+from lfd_render.gpu.memory import Buffer, Owned, TableTexture, TextureArray
 from lfd_render.gpu.shaders import Source, assemble
 
 if TYPE_CHECKING:
@@ -24,12 +24,12 @@ Texture = TextureArray | TableTexture
 Samplers = Mapping[str, "Texture | list[TextureArray]"]
 
 
-class _Program:
+class _Program(Owned):
     """What compute and raster programs share: binding by name."""
 
     def __init__(self, device: Device, path: str, text: str, program: Any) -> None:
+        super().__init__(device)
         self.path = path
-        self._device = device
         self._program = program
         self._declared = set(_DECLARATION.findall(text))
         self._blocks: dict[str, tuple[bool, int]] = {}  # name → (storage, binding)
@@ -38,8 +38,9 @@ class _Program:
         for name in program:
             member = program[name]
             if isinstance(member, moderngl.StorageBlock | moderngl.UniformBlock):
-                member.binding = len(self._blocks)
+                # Storage and uniform blocks count apart.
                 storage = isinstance(member, moderngl.StorageBlock)
+                member.binding = sum(kind == storage for kind, _ in self._blocks.values())
                 self._blocks[name] = (storage, member.binding)
             elif isinstance(member, moderngl.Uniform) and name not in images:
                 self._uniforms.add(name)
@@ -92,8 +93,7 @@ class _Program:
             self._program[name].value = units[0] if len(units) == 1 else units
             unit += len(group)
 
-    def release(self) -> None:
-        """Free the program."""
+    def _free(self) -> None:
         self._program.release()
 
 

@@ -51,13 +51,15 @@ CCW = 0x0901
 BACK = 0x0405
 LESS = 0x0201
 
+OUT_OF_MEMORY = 0x0505
+MAX_COMPUTE_SHADER_STORAGE_BLOCKS = 0x90DB
+
 ERRORS = {
     0x0500: "GL_INVALID_ENUM",
     0x0501: "GL_INVALID_VALUE",
     0x0502: "GL_INVALID_OPERATION",
     0x0503: "GL_STACK_OVERFLOW",
     0x0504: "GL_STACK_UNDERFLOW",
-    0x0505: "GL_OUT_OF_MEMORY",
     0x0506: "GL_INVALID_FRAMEBUFFER_OPERATION",
     0x0507: "GL_CONTEXT_LOST",
 }
@@ -116,3 +118,9 @@ class RawGl:
 
     def __getattr__(self, name: str) -> Any:
         return self._functions[name]
+
+    def integer(self, name: int) -> int:
+        """A single integer of glGetIntegerv."""
+        value = ctypes.c_int()
+        self.glGetIntegerv(name, ctypes.byref(value))
+        return int(value.value)

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 # 16 bytes a triangle and 32 a vertex: both stay below llvmpipe's 128 MiB a buffer.
 BATCH_TRIANGLES = 1 << 22
 BATCH_VERTICES = 1 << 21
+_LEAST_ALPHA = 1 / 255  # of a blended texel that shows
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,8 @@ class DrawRun:
 
 @dataclass
 class _Attributes:
-    """What shading reads, in device form: normals [n] octahedral, uv0 [n, 2], extras [n]."""
+    """What shading reads, in device form: normals [n] octahedral, uv0 [n, 2], extras [n], or [1]
+    where the scene has none."""
 
     normals: NDArray[np.uint32]
     uv0: NDArray[np.float32]
@@ -48,7 +50,8 @@ class _Attributes:
 
     def of(self, used: NDArray[np.uint32]) -> _Attributes:
         """Those of some vertices."""
-        return _Attributes(self.normals[used], self.uv0[used], self.extras[used])
+        extras = self.extras[used] if len(self.extras) == len(self.normals) else self.extras
+        return _Attributes(self.normals[used], self.uv0[used], extras)
 
 
 @dataclass
@@ -125,11 +128,11 @@ class SceneBuffers:
         self.textures = MaterialTextures(device, scene.materials, scene.images)
         self.warnings = [*scene.warnings, *self.textures.warnings]
         self._world_from_local = np.stack([i.world_from_local for i in scene.instances])
-        normal = np.linalg.inv(_nonsingular(self._world_from_local[:, :3, :3])).transpose(0, 2, 1)
+        normal = _cofactors(self._world_from_local[:, :3, :3])
         self._records = np.zeros(len(scene.instances), dtype("Draw"))
         for axis, field in enumerate(("x", "y", "z")):
             # Normals are normalised where they are used; only the largest entry must be near 1.
-            scale = np.abs(normal).max(axis=(1, 2), keepdims=True)
+            scale = np.maximum(np.abs(normal).max(axis=(1, 2), keepdims=True), 1e-300)
             self._records[f"normal_matrix_{field}"][:, :3] = (normal / scale)[:, :, axis]
         self._records["material"] = [scene.meshes[i.mesh].material for i in scene.instances]
         self.draws = Buffer(device, "draws", self._records.nbytes)
@@ -217,10 +220,16 @@ class SceneBuffers:
         self.textures.release()
 
 
-def _nonsingular(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Flattened placements have no inverse; their normals do not matter, only that it exists."""
-    singular = np.abs(np.linalg.det(matrices)) < np.finfo(np.float64).tiny
-    return np.where(singular[:, None, None], np.eye(3), matrices)
+def _cofactors(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What normals go by: the inverse transpose times |determinant|, [n, 3, 3], which flattened
+    placements have too."""
+    columns = matrices.transpose(0, 2, 1)
+    # Scaled first, so that products neither overflow nor vanish.
+    columns = columns / np.maximum(np.abs(columns).max(axis=(1, 2), keepdims=True), 1e-300)
+    x, y, z = columns[:, 0], columns[:, 1], columns[:, 2]
+    cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=2)
+    determinant = np.einsum("ni,ni->n", x, cofactors[:, :, 0])
+    return cofactors * np.where(determinant < 0.0, -1.0, 1.0)[:, None, None]
 
 
 def _needs_extras(mesh: Mesh) -> bool:
@@ -302,14 +311,14 @@ def _material_records(scene: Scene) -> NDArray[np.void]:
         record["base_color_rg"] = _unorm16x2(red, green)
         record["base_color_ba"] = _unorm16x2(blue, alpha)
         record["emissive_rg"] = _half2(*material.emissive[:2])
-        record["emissive_b_cutoff"] = _half2(material.emissive[2], material.alpha_cutoff)
+        cutoff = _LEAST_ALPHA if material.alpha_mode == "blend" else material.alpha_cutoff
+        record["emissive_b_cutoff"] = _half2(material.emissive[2], cutoff)
         record["metallic_roughness"] = _unorm16x2(material.metallic, material.roughness)
         normal, occlusion = material.normal_texture, material.occlusion_texture
         record["normal_occlusion"] = _half2(
             normal.scale if normal else 1.0, occlusion.scale if occlusion else 1.0
         )
-        alpha_mode = CONSTANTS[f"ALPHA_{material.alpha_mode.upper()}"]
-        record["flags"] = alpha_mode | (CONSTANTS["UNLIT"] if material.unlit else 0)
+        record["flags"] = CONSTANTS["UNLIT"] if material.unlit else 0
         for slot in material.texture_slots().values():
             height, width = scene.images[slot.image].pixels.shape[:2]
             stretch = 1.0 if slot.uv_transform is None else np.linalg.det(slot.uv_transform[:2, :2])

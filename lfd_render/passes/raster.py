@@ -6,9 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.display import Rig, ViewGrid
-from lfd_render.gpu import raw as gl
 from lfd_render.gpu.device import Device
-from lfd_render.gpu.framebuffer import IndexedDraws, LayerTarget
+from lfd_render.gpu.framebuffer import (
+    IndexedDraws,
+    LayerTarget,
+    blending_at_equal_depth,
+    depth_only,
+    face_culling,
+    rasterising,
+)
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import RasterProgram, Uniform
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
@@ -19,7 +25,11 @@ _Camera = dict[str, Uniform]
 
 
 class RasterForward:
-    """SceneBuffers, one eye → one layer of ViewTarget.images: every fragment shaded as it comes."""
+    """SceneBuffers, one eye → one layer of ViewTarget.images: every fragment shaded as it comes.
+
+    Blended materials show their nearest layer, drawn where its depth is; coincident blended
+    triangles all blend there, where the other techniques keep one.
+    """
 
     def __init__(self, device: Device, scene: SceneBuffers, target: ViewTarget) -> None:
         self._device = device
@@ -32,7 +42,7 @@ class RasterForward:
                 "raster/forward.vert",
                 "raster/forward.frag",
                 {
-                    "ALPHA_TESTED": int(alpha_mode == "mask"),
+                    "ALPHA_TESTED": int(alpha_mode != "opaque"),
                     "BLENDED": int(alpha_mode == "blend"),
                     **scene.constants(),
                 },
@@ -50,50 +60,27 @@ class RasterForward:
     def __call__(self, view: int, band: Band, placement: Placement) -> None:
         """Render one view's rows of a band, row 0 of the layer on top."""
         rig = self._target.rig
-        raw = self._device.raw
         eye_mm = float(rig.eye_x_mm[view])
-        eye_world = placement.world_from_display @ np.array([eye_mm, 0.0, rig.distance_mm, 1.0])
         clip = band_clip_from_display(rig, self._target.grid, band, view)
-        self._layer.use(view, band.rows)
-        self._layer.clear((*placement.background, 0.0))
-        raw.glEnable(gl.DEPTH_TEST)
-        raw.glDepthFunc(gl.LESS)
-        raw.glEnable(gl.CLIP_DISTANCE0)
-        raw.glEnable(gl.CLIP_DISTANCE0 + 1)
-        raw.glCullFace(gl.BACK)
         camera: _Camera = {
             "clip_from_display": gl_matrix(clip),
             "world_from_display": gl_matrix(placement.world_from_display),
             "eye_mm": eye_mm,
-            "eye_world": tuple(eye_world[:3]),
         }
         batches = list(zip(self._scene.batches, self._draws, strict=True))
-        for batch, draws in batches:
-            if batch.alpha_mode != "blend":
-                self._draw_batch(batch, draws, band, camera)
         blended = [pair for pair in batches if pair[0].alpha_mode == "blend"]
-        if blended:
-            self._blend_nearest(blended, band, camera)
-        raw.glDisable(gl.CLIP_DISTANCE0)
-        raw.glDisable(gl.CLIP_DISTANCE0 + 1)
-        raw.glDisable(gl.CULL_FACE)
-        raw.glDisable(gl.DEPTH_TEST)
-
-    def _blend_nearest(
-        self, blended: list[tuple[Batch, IndexedDraws]], band: Band, camera: _Camera
-    ) -> None:
-        """Lay the nearest blended surface over what is drawn: depth first, then colour at it."""
-        raw = self._device.raw
-        raw.glColorMask(0, 0, 0, 0)
-        for batch, draws in blended:
-            self._draw_batch(batch, draws, band, camera)
-        raw.glColorMask(1, 1, 1, 1)
-        raw.glDepthFunc(gl.EQUAL)
-        raw.glEnable(gl.BLEND)
-        raw.glBlendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA)
-        for batch, draws in blended:
-            self._draw_batch(batch, draws, band, camera)
-        raw.glDisable(gl.BLEND)
+        self._layer.use(view, band.rows)
+        self._layer.clear((*placement.background, 0.0))
+        with rasterising(self._device):
+            for batch, draws in batches:
+                if batch.alpha_mode != "blend":
+                    self._draw_batch(batch, draws, band, camera)
+            with depth_only(self._device):
+                for batch, draws in blended:
+                    self._draw_batch(batch, draws, band, camera)
+            with blending_at_equal_depth(self._device):
+                for batch, draws in blended:
+                    self._draw_batch(batch, draws, band, camera)
 
     def _draw_batch(
         self,
@@ -103,7 +90,6 @@ class RasterForward:
         camera: _Camera,
     ) -> None:
         """Draw a batch's runs: sides culled as each run's materials and placements ask."""
-        raw = self._device.raw
         buffers = {
             "DisplayPositions": batch.display_positions,
             "LocalPositions": batch.local_positions,
@@ -113,12 +99,9 @@ class RasterForward:
             "FrameBlock": band.frame(batch),
             **self._scene.materials_of(),
         }
-        samplers = self._scene.samplers()
+        self._programs[batch.alpha_mode].set(buffers, camera, self._scene.samplers())
         for run in self._scene.runs(batch):
-            self._programs[batch.alpha_mode].set(buffers, camera, samplers)
-            (raw.glDisable if run.double_sided else raw.glEnable)(gl.CULL_FACE)
-            # Row 0 at the raster's bottom turns windings over.
-            raw.glFrontFace(gl.CCW if run.mirrored else gl.CW)
+            face_culling(self._device, double_sided=run.double_sided, mirrored=run.mirrored)
             draws.draw(run.first, run.count)
 
     def release(self) -> None:

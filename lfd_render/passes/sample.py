@@ -16,7 +16,7 @@ from lfd_render.passes.view_target import Band
 SEGMENT = 64  # triangles a thread of the prefix sum takes
 GROUP_ROWS = 4  # rows of points a work group of the splatter takes
 GROUPS_ACROSS = 32768  # work groups along x before y grows
-MOST_WINDOW_ITEMS = 1 << 21  # rows of points that one buffer holds: 48 MiB
+MOST_WINDOW_ITEMS = 1 << 21  # rows of points that one buffer holds: 64 MiB
 _HEADROOM = 1.25  # of a window over the items found, so that a moving scene rarely outgrows it
 _SPAN_GROUP = 128  # local_size_x of sample/span.comp
 _SEGMENT_GROUP = 64  # local_size_x of sample/sum.comp and sample/compact.comp
@@ -117,12 +117,14 @@ class Sample:
         points.most_items.fill(0)
         if most <= points.window_items * points.windows:
             return False
-        wanted = int(most * _HEADROOM)
+        wanted = min(int(most * _HEADROOM), 0xFFFFFFFF - MOST_WINDOW_ITEMS)
         points.window_items = min(wanted, MOST_WINDOW_ITEMS)
         points.windows = -(-wanted // points.window_items)
         points.rows.release()
         points.work.release()
-        row_bytes = dtype("PointRow").itemsize * points.window_items
+        # Work groups come in whole lines of GROUPS_ACROSS and load before they know their bounds.
+        padding = GROUP_ROWS * (GROUPS_ACROSS if points.window_items > GROUPS_ACROSS else 1)
+        row_bytes = dtype("PointRow").itemsize * (points.window_items + padding)
         points.rows = Buffer(self._device, "point rows", row_bytes)
         points.work = Buffer(self._device, "points", dtype("Work").itemsize * points.windows)
         return True

@@ -55,10 +55,10 @@ class Splat:
                 "RowShifts": Buffer.of(device, "rig", shifts),
             }
         self._kernels = {
-            (step, masked): Kernel(
-                device, path, {**constants, "STEP": step, "ALPHA_TESTED": int(masked)}
+            (step, tested): Kernel(
+                device, path, {**constants, "STEP": step, "ALPHA_TESTED": int(tested)}
             )
-            for masked in sorted({batch.alpha_mode == "mask" for batch in scene.batches})
+            for tested in sorted({batch.alpha_mode != "opaque" for batch in scene.batches})
             for step in self.steps
         }
 
@@ -73,7 +73,7 @@ class Splat:
         views: ViewBuffers,
     ) -> None:
         """Splat one window of points; every window and batch has had its step before the next."""
-        kernel = self._kernels[step, batch.alpha_mode == "mask"]
+        kernel = self._kernels[step, batch.alpha_mode != "opaque"]
         kernel.set(
             {
                 **batch.geometry(),

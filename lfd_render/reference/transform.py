@@ -88,13 +88,16 @@ def points_by(matrix: Float64, points: NDArray[np.floating]) -> Float64:
 def normals_by(world_from_local: Float64, normals: NDArray[np.floating]) -> Float64:
     """Unit normals [n, 3] by the inverse transpose of a placement, made unit again.
 
-    A normal n of a plane n·p = c keeps meeting the moved plane: n'·(M p) = c with n' = n·M⁻¹. A
-    placement without an inverse leaves normals as they are, since it flattens what they stand on.
+    A normal n of a plane n·p = c keeps meeting the moved plane: n'·(M p) = c with n' = n·M⁻¹. With
+    the singular values s of M = U·S·Vᵀ, M⁻ᵀ times |det M| is ±U·diag(s₁s₂, s₀s₂, s₀s₁)·Vᵀ, which a
+    placement that flattens has as well.
     """
     linear = world_from_local[:3, :3]
-    singular = abs(np.linalg.det(linear)) < np.finfo(np.float64).tiny
-    turned = normals.astype(np.float64) @ (np.eye(3) if singular else np.linalg.inv(linear))
-    return unit(turned)
+    u, s, vt = np.linalg.svd(linear)
+    s = s / max(float(s[0]), np.finfo(np.float64).tiny)
+    cofactors = np.linalg.det(u @ vt) * u @ np.diag([s[1] * s[2], s[0] * s[2], s[0] * s[1]]) @ vt
+    mirror = -1.0 if np.linalg.det(linear) < 0.0 else 1.0
+    return unit(mirror * normals.astype(np.float64) @ cofactors.T)
 
 
 def unit(vectors: Float64) -> Float64:

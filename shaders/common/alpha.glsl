@@ -1,4 +1,5 @@
-// Whether a masked triangle's alpha reaches its cutoff at a view pixel.
+// Whether a triangle's alpha reaches its material's cutoff at a view pixel. For blended materials that
+// is the least alpha that shows, so that clear texels hide nothing blended behind them.
 
 #include "common/surface.glsl"
 #include "common/textures.glsl"

@@ -24,5 +24,6 @@ vec3 srgb_from_linear(vec3 linear) {
 }
 
 vec3 encoded(vec3 radiance, float exposure) {
-    return srgb_from_linear(clamp(neutral_tone(max(radiance, 0.0) * exposure), 0.0, 1.0));
+    vec3 exposed = min(max(radiance, 0.0) * exposure, 65504.0);  // infinite light has no tone
+    return srgb_from_linear(clamp(neutral_tone(exposed), 0.0, 1.0));
 }

@@ -1,5 +1,4 @@
-// A triangle's plane and its depth along a view pixel's ray. Every path that compares depths calls
-// plane_depth, so that equal pixels of equal triangles give equal bits.
+// A triangle's plane, the side an eye stands on, and depth along a ray.
 
 #include "common/frame.glsl"
 
@@ -34,11 +33,13 @@ float densest_eye_columns(Plane plane) {
     return abs(first) > abs(last) ? frame.eye_first : frame.eye_last;
 }
 
-// Depth d = D − Z where the ray from the eye through a window point meets the plane, kept within
-// the triangle's own depths, which bounds what rounding does to slivers.
-float plane_depth(Plane plane, float eye_mm, float x_mm, float y_mm) {
+// k = D/d where the ray from the eye through a window point meets the plane, kept within the
+// triangle's own depths, which bounds what rounding does to slivers. Linear in the window point.
+float plane_k(Plane plane, float eye_mm, float x_mm, float y_mm) {
     precise float toward = plane.normal.x * (eye_mm - x_mm) - plane.normal.y * y_mm
         + plane.normal.z * frame.distance_mm;
-    precise float depth = frame.distance_mm * eye_side(plane, eye_mm) / toward;
-    return clamp(toward == 0.0 ? plane.depths.x : depth, plane.depths.x, plane.depths.y);
+    float side = eye_side(plane, eye_mm);
+    float k_nearest = frame.distance_mm / plane.depths.x, k_farthest = frame.distance_mm / plane.depths.y;
+    precise float k = toward / side;
+    return side == 0.0 ? k_nearest : clamp(k, k_farthest, k_nearest);
 }

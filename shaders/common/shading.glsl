@@ -9,9 +9,9 @@ const vec3 MOST_RADIANCE = vec3(65504.0);  // what half floats hold
 const float SMALLEST_ALPHA = 0.002;  // keeps the specular peak of a mirror finite
 
 struct Surface {
-    vec3 p_world;
+    vec3 to_eye;       // world, any length; not two positions, which lose precision far from 0
     vec3 normal;       // interpolated, world, any length
-    vec3 dp_dx;        // change of p_world over a column and a row
+    vec3 dp_dx;        // change of world position over a column and a row
     vec3 dp_dy;
     Footprint uv0;
     Footprint uv1;
@@ -90,7 +90,7 @@ vec3 emitted(Surface surface) {
 }
 
 // Radiance towards the eye and opacity.
-vec4 shade(Surface surface, vec3 eye_world) {
+vec4 shade(Surface surface) {
     vec4 base_color_alpha = base_color_of(surface);
     vec3 base_color = base_color_alpha.rgb;
     if ((materials[surface.material].flags & UNLIT) != 0u) return base_color_alpha;
@@ -102,7 +102,7 @@ vec4 shade(Surface surface, vec3 eye_world) {
     if (slot != NO_TEXTURE) normal = mapped_normal(normal, surface, slot);
     if (surface.back) normal = -normal;
 
-    vec3 view = normalize(eye_world - surface.p_world);
+    vec3 view = normalize(surface.to_eye);
     float n_dot_v = clamp(abs(dot(normal, view)), 1e-4, 1.0);
     vec3 f0 = mix(vec3(0.04), base_color, metallic);
     vec3 albedo = base_color * (1.0 - metallic);

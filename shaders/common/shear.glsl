@@ -65,7 +65,7 @@ vec2 seen_by_either(vec2 at_p, vec2 at_q) {
     return vec2(min(first.x, last.x), max(first.y, last.y));
 }
 
-// Cut a segment to the near plane and to the union of the eyes' frusta, one column of margin
+// Cut a segment to the near plane and to the union of the eyes' frusta, two columns of margin
 // outside, so that the cut itself is never inside a view.
 vec2 clip_slice(vec3 p, vec3 q) {
     vec2 ends = positive_part(depth_of(p) - frame.near_mm, depth_of(q) - frame.near_mm);

@@ -16,10 +16,11 @@ struct Hit {
 // is t·(e − dir·(n·e)/(n·dir)) for a window step e.
 Hit hit_triangle(vec3 a, vec3 b, vec3 c, Plane plane, float eye_mm, float x_mm, float y_mm) {
     vec3 direction = vec3(x_mm - eye_mm, y_mm, -frame.distance_mm);
-    float t = plane_depth(plane, eye_mm, x_mm, y_mm) / frame.distance_mm;
+    float t = 1.0 / plane_k(plane, eye_mm, x_mm, y_mm);
     Hit hit;
     hit.p_display = vec3(eye_mm, 0.0, frame.distance_mm) + t * direction;
-    vec3 slope = direction / dot(plane.normal, direction);
+    float across = dot(plane.normal, direction);
+    vec3 slope = across == 0.0 ? vec3(0.0) : direction / across;
     hit.dp_dx = t * frame.column_mm * (vec3(1.0, 0.0, 0.0) - slope * plane.normal.x);
     hit.dp_dy = -t * frame.row_mm * (vec3(0.0, 1.0, 0.0) - slope * plane.normal.y);
 

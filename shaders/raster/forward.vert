@@ -12,10 +12,9 @@ layout(std430) readonly restrict buffer LocalPositions { vec4 local_positions[];
 layout(std430) readonly restrict buffer Draws { Draw draws[]; };
 
 uniform mat4 clip_from_display;
-uniform mat4 world_from_display;
 uniform float eye_mm;
 
-out vec3 p_world;
+out vec3 p_display;
 out vec3 normal_world;
 out vec4 uv01;
 out vec4 color;
@@ -27,15 +26,14 @@ out gl_PerVertex {
 };
 
 void main() {
-    vec4 p_display = vec4(display_positions[gl_VertexID].xyz, 1.0);
+    p_display = display_positions[gl_VertexID].xyz;
 
-    gl_Position = clip_from_display * p_display;
+    gl_Position = clip_from_display * vec4(p_display, 1.0);
     float d = frame.distance_mm - p_display.z;
     float x_times_d = frame.distance_mm * p_display.x - p_display.z * eye_mm;
     gl_ClipDistance[0] = x_times_d + 0.5 * frame.panel_width_mm * d;
     gl_ClipDistance[1] = 0.5 * frame.panel_width_mm * d - x_times_d;
 
-    p_world = (world_from_display * p_display).xyz;
     normal_world = vertex_normal(uint(gl_VertexID));
     uv01 = vec4(tex_coords[gl_VertexID], vertex_uv1(uint(gl_VertexID)));
     color = vertex_color(uint(gl_VertexID));

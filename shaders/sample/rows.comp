@@ -54,6 +54,10 @@ void main() {
     if (rightward != faces(facing, eye_side(plane, eye * frame.column_mm))) {
         SliceEnd end = slice.a; slice.a = slice.b; slice.b = end;
     }
+    float y_mm = row_centre_mm(row), offset = row_offsets[row];
+    float a_mm = (column_from(slice.a, eye) - offset) * frame.column_mm;
+    float b_mm = (column_from(slice.b, eye) - offset) * frame.column_mm;
     point_rows[place] = PointRow(slice.a.at_centre, slice.a.k, slice.b.at_centre, slice.b.k,
+                                 plane_k(plane, eye * frame.column_mm, a_mm, y_mm), plane_k(plane, eye * frame.column_mm, b_mm, y_mm),
                                  seen.triangle, uint(row) | (both ? DOUBLE_SIDED : 0u));
 }

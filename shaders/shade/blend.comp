@@ -11,7 +11,7 @@ void main() {
     Visible seen = visible_pixel();
     if (seen.nothing) return;
     Surface surface = surface_at(seen.triangle, seen.pixel.z, frame.band_first + seen.pixel.y, seen.pixel.x);
-    vec4 over = shade(surface, eye_world_of(seen.pixel.z));
+    vec4 over = shade(surface);
     vec4 under = imageLoad(view_images, seen.pixel);
     imageStore(view_images, seen.pixel, vec4(mix(under.rgb, over.rgb, over.a), 1.0));
 }

@@ -13,5 +13,5 @@ void main() {
     Visible seen = visible_pixel();
     if (seen.nothing) return;
     Surface surface = surface_at(seen.triangle, seen.pixel.z, frame.band_first + seen.pixel.y, seen.pixel.x);
-    imageStore(view_images, seen.pixel, vec4(shade(surface, eye_world_of(seen.pixel.z)).rgb, 1.0));
+    imageStore(view_images, seen.pixel, vec4(shade(surface).rgb, 1.0));
 }

@@ -38,10 +38,6 @@ Visible visible_pixel() {
     return seen;
 }
 
-vec3 eye_world_of(int view) {
-    return (world_from_display * vec4(eyes[view] * frame.column_mm, 0.0, frame.distance_mm, 1.0)).xyz;
-}
-
 Surface surface_at(uint triangle, int view, int row, int column) {
     uvec4 corners = triangles[triangle];
     vec3 a = display_positions[corners.x].xyz;
@@ -56,7 +52,7 @@ Surface surface_at(uint triangle, int view, int row, int column) {
     uint facing = draws[corners.w].facing;
 
     Surface surface;
-    surface.p_world = (world_from_display * vec4(hit.p_display, 1.0)).xyz;
+    surface.to_eye = mat3(world_from_display) * (vec3(eye_mm, 0.0, frame.distance_mm) - hit.p_display);
     surface.normal = mat3(vertex_normal(corners.x), vertex_normal(corners.y), vertex_normal(corners.z)) * hit.weights;
     surface.dp_dx = mat3(world_from_display) * hit.dp_dx;
     surface.dp_dy = mat3(world_from_display) * hit.dp_dy;

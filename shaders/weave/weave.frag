@@ -1,6 +1,6 @@
 // Interleave views into the panel image: each subpixel takes its view's pixel at its lens.
 // Phases come from tables in units of views: whole views and a 32-bit fraction of one, added with
-// carry, so that the view index is the float64 formula's (docs: displays, section 1). Row 0 of the
+// carry; PhaseTables.view_index_map adds the same words. Row 0 of the
 // target is the panel's top row.
 // In: column_table [x]: phase; row_table [y]: phase, column of lens 0 as float bits; view_images [view,
 // row, column] in scene-linear light. Out: linear panel pixels.
@@ -45,6 +45,9 @@ void main() {
         int whole = int(phase.x);
         int lens = int(floor((float(whole) + 0.5) / float(frame.views)));
         int slot = whole - lens * frame.views;
+        int off_by = slot < 0 ? -1 : slot >= frame.views ? 1 : 0;  // float32 division of large numbers
+        lens += off_by;
+        slot -= off_by * frame.views;
         int view = min(frame.views - 1, frame.views - slot - (phase.y != 0u ? 1 : 0));
 
         float column = float(lens) * columns_per_lens + lens_0;
