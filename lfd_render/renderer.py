@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Any
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from lfd_render.display import Camera, DisplayProfile, Rig, ViewGrid
 from lfd_render.display.model import Spacing
-from lfd_render.errors import SceneError, UsageError
+from lfd_render.errors import ResourceError, SceneError, UsageError
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.scene_buffers import SceneBuffers
@@ -30,6 +31,8 @@ REPEAT_TURN_RAD = np.deg2rad(0.5)  # how far the scene turns between repeated fr
 TECHNIQUES = ("lfdpr", "mvr")
 PRESETS = ("default", "paper")
 PROJECTIONS = ("shear", "general")
+MOST_RADIANCE = 65504.0  # what half floats hold
+MOST_VIEW_PIXELS = 1 << 32  # of all views together: hours on a processor, and far above any panel
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,10 @@ class RenderOptions:
             raise UsageError(f"views: {self.views} is out of range; use 1 to 1024")
         if self.view_size is not None and not all(1 <= n <= 16384 for n in self.view_size):
             raise UsageError(f"view size: {self.view_size} is out of range; use 1 to 16384 a side")
+        if len(self.background) != 3 or not all(0 <= c <= MOST_RADIANCE for c in self.background):
+            raise UsageError(
+                f"background: {self.background}; use three numbers from 0 to {MOST_RADIANCE:g}"
+            )
         if self.repeat < 1:
             raise UsageError(f"repeat: {self.repeat} is out of range; use 1 or more")
         if not 0.0 < self.exposure < np.inf:
@@ -120,7 +127,9 @@ class Renderer:
         self.close()
 
     def close(self) -> None:
-        """Free the scene and the context."""
+        """Free the scene and the context. Calling it again does nothing."""
+        if self.device.closed:
+            return
         self.device.activate()
         self._drop_scene()
         if self._owns_device:
@@ -141,14 +150,15 @@ class Renderer:
         Raises SceneError, UsageError, ResourceError or GpuError.
         """
         choice = RenderOptions(views=views, **options)
-        self.device.activate()
-        return self._render(scene, display, camera or camera_for(scene, display), choice)
+        with self._call():
+            return self._render(scene, display, camera or camera_for(scene, display), choice)
 
     def _render(
         self, scene: Scene, display: DisplayProfile, camera: Camera, choice: RenderOptions
     ) -> Eia:
         rig = display.rig(choice.views, choice.spacing)
         grid = _grid(display, choice, rig.views)
+        _check_size(grid, rig.views)
         _check_in_front(scene, camera, rig)
         timings = _Timings()
         buffers = self._upload(scene, timings)
@@ -160,29 +170,27 @@ class Renderer:
             return frames
 
         frames = timings.measure("compile", self.device, compile_all)
-        try:
-            for index in range(choice.repeat):
-                turned = camera.turned((index - choice.repeat + 1) * float(REPEAT_TURN_RAD))
-                matrix = turned.display_from_world(rig.panel_mm)
-                timings.frames.append(frames.run(Placement(matrix, choice.background)))
-            linear, pixels = timings.measure("read", self.device, frames.read)
-            report = {
-                "technique": choice.technique,
-                "preset": choice.preset,
-                "views": rig.views,
-                "view_size": [grid.columns, grid.rows],
-                "view_grid": grid.kind,
-                "triangles": scene.triangle_count,
-                "points": frames.technique.count_points(),
-                "renderer": self.device.name,
-                "device_bytes": self.device.ledger.peak,
-                "warnings": list(buffers.warnings),
-                "camera": camera.to_json_dict(),
-                "timings_ms": timings.summary(),
-            }
-            self.device.check()
-        finally:
-            frames.release()
+        for index in range(choice.repeat):
+            turned = camera.turned((index - choice.repeat + 1) * float(REPEAT_TURN_RAD))
+            matrix = turned.display_from_world(rig.panel_mm)
+            timings.frames.append(frames.run(Placement(matrix, choice.background)))
+        linear, pixels = timings.measure("read", self.device, frames.read)
+        report = {
+            "technique": choice.technique,
+            "preset": choice.preset,
+            "views": rig.views,
+            "view_size": [grid.columns, grid.rows],
+            "view_grid": grid.kind,
+            "triangles": scene.triangle_count,
+            "points": frames.technique.count_points(),
+            "renderer": self.device.name,
+            "device_bytes": self.device.ledger.peak,
+            "warnings": list(buffers.warnings),
+            "camera": camera.to_json_dict(),
+            "timings_ms": timings.summary(),
+        }
+        self.device.check()
+        frames.release()
         metadata = {
             "lfd:profile": display.name,
             "lfd:profile-hash": display.hash,
@@ -208,8 +216,8 @@ class Renderer:
         """
         choice = RenderOptions(views=views, **options)
         rig = rig or display.rig(choice.views, choice.spacing)
-        self.device.activate()
-        return self._views(scene, display, camera or camera_for(scene, display), rig, choice)
+        with self._call():
+            return self._views(scene, display, camera or camera_for(scene, display), rig, choice)
 
     def _views(
         self,
@@ -221,30 +229,39 @@ class Renderer:
     ) -> NDArray[np.uint8]:
         width, height = choice.view_size or upright_size(display, display.views)
         grid = ViewGrid.upright(display, width, height)
+        _check_size(grid, rig.views)
         _check_in_front(scene, camera, rig)
         buffers = self._upload(scene, _Timings())
         technique = self._technique(buffers, rig, grid, choice)
         encode = Encode(self.device, grid.columns, technique.target.images.height)
         pictures = np.empty((rig.views, grid.rows, grid.columns, 3), np.uint8)
         clock = StageClock(self.device)
-        try:
-            technique.begin(
-                Placement(camera.display_from_world(display.size_mm), choice.background), clock
-            )
-            technique.warm_up(clock)
-            for band in technique.target.bands:
-                technique.render(band, clock)
-                for view in range(rig.views):
-                    encode(technique.target.images, view, choice.exposure)
-                    rows = slice(band.first, band.first + band.rows)
-                    pictures[view, rows] = encode.read()[: band.rows]
-            complete = technique.complete()
-            assert complete, "the warm-up made room for the points of this very placement"
-            self.device.check()
-        finally:
-            technique.release()
-            encode.release()
+        technique.begin(
+            Placement(camera.display_from_world(display.size_mm), choice.background), clock
+        )
+        technique.warm_up(clock)  # which also makes room for the points of this very placement
+        for band in technique.target.bands:
+            technique.render(band, clock)
+            for view in range(rig.views):
+                encode(technique.target.images, view, choice.exposure)
+                rows = slice(band.first, band.first + band.rows)
+                pictures[view, rows] = encode.read()[: band.rows]
+        self.device.check()
+        technique.release()
+        encode.release()
         return pictures
+
+    @contextmanager
+    def _call(self) -> Iterator[None]:
+        """One rendering call: nothing of it stays on the device when it fails."""
+        self.device.activate()
+        self.device.ledger.restart_peak()
+        try:
+            with self.device.undoing():
+                yield
+        except BaseException:
+            self._drop_scene()  # it may be among what was undone
+            raise
 
     def _upload(self, scene: Scene, timings: _Timings) -> SceneBuffers:
         if self._buffers is None or self._scene is not scene:
@@ -348,6 +365,16 @@ def _grid(display: DisplayProfile, choice: RenderOptions, views: int) -> ViewGri
     if choice.preset == "paper":
         return ViewGrid.upright(display, *upright_size(display, views))
     return (ViewGrid.sheared if choice.technique == "mvr" else ViewGrid.lens)(display, rows)
+
+
+def _check_size(grid: ViewGrid, views: int) -> None:
+    """Raise ResourceError for more view pixels than anyone waits for."""
+    pixels = views * grid.columns * grid.rows
+    if pixels > MOST_VIEW_PIXELS:
+        raise ResourceError(
+            f"views: {views} of {grid.columns}×{grid.rows} are {pixels} pixels, more than "
+            f"{MOST_VIEW_PIXELS}; use fewer or smaller views"
+        )
 
 
 def _check_in_front(scene: Scene, camera: Camera, rig: Rig) -> None:

@@ -3,8 +3,9 @@
     φ = (u + c/(3W) + v·T)·P − center          u = (x+½)/W, v = (y+½)/H from the bottom
     z = 1 − frac(φ),  view = floor(z·N)         view 0 leftmost
 
-φ is the sum of a column table, a row table and a table of subpixel cells; that sum, in this
-order, is the definition which every other implementation is held to.
+φ is the sum of a column table, a row table and a table of subpixel cells. Where a phase lies on the
+boundary of two views, rounding would decide; so views are defined on `FixedPhases`, the same tables
+in whole views and 2⁻³² fractions of one, which add without rounding on every device.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 Float64 = NDArray[np.float64]
 
+_FRACTION_BITS = 32
 _BLOCK_ROWS = 64  # phases of a whole 4K panel take 200 MB, those of a block 6 MB
 
 
@@ -87,13 +89,61 @@ class PhaseTables:
             phase += self.cell[self.kind_at(x, y), channel]
         return phase
 
+    def fixed(self, views: int) -> FixedPhases:
+        """The tables in units of views, without the whole lenses of the first column."""
+        lenses = int(np.floor(self.column[0, 0]))
+        return FixedPhases(
+            views=views,
+            lenses=lenses,
+            column=_fixed(self.column[:, 0] - lenses, views),
+            row=_fixed(self.row, views),
+            # Channels differ by the same phase in every column.
+            subpixel=_fixed(self.cell + (self.column[0] - self.column[0, 0]), views),
+        )
+
     def view_index_map(self, views: int) -> NDArray[np.uint16]:
         """View of every subpixel, [y, x, channel]."""
         width, height = self.size_px
+        fixed = self.fixed(views)
+        x = np.arange(width)
         index = np.empty((height, width, 3), np.uint16)
         for rows in _blocks(height):
-            index[rows] = view_index(self.phase(rows), views)
+            y = np.arange(height)[rows]
+            kinds = self.kind_at(x[None, :], y[:, None])
+            phase = fixed.column[None, :, None] + fixed.row[y, None, None] + fixed.subpixel[kinds]
+            index[rows] = fixed.view(phase)
         return index
+
+
+@dataclass(frozen=True, eq=False)
+class FixedPhases:
+    """Phases as integers: φ·views·2³², less `lenses` whole lenses. Sums are exact.
+
+    column int64 [W], row int64 [H], subpixel int64 [kind, channel], which holds what channels
+    and cells add to a pixel.
+    """
+
+    views: int
+    lenses: int
+    column: NDArray[np.int64]
+    row: NDArray[np.int64]
+    subpixel: NDArray[np.int64]
+
+    def view(self, phase: NDArray[np.int64]) -> NDArray[np.uint16]:
+        """View ⌊(1 − frac φ)·N⌋ of summed phases, clamped to N − 1 where frac φ is 0."""
+        within: NDArray[np.int64] = phase % (self.views << _FRACTION_BITS)
+        ahead = -(
+            -within >> _FRACTION_BITS
+        )  # rounded up: a phase on a boundary is in the view below
+        index: NDArray[np.int64] = np.minimum(self.views - ahead, self.views - 1)
+        return index.astype(np.uint16)
+
+
+def _fixed(phases: Float64, views: int) -> NDArray[np.int64]:
+    in_views = phases * views
+    whole = np.floor(in_views)
+    fraction = np.rint((in_views - whole) * 2.0**_FRACTION_BITS)
+    return (whole.astype(np.int64) << _FRACTION_BITS) + fraction.astype(np.int64)
 
 
 def phase_tables(profile: DisplayProfile) -> PhaseTables:

@@ -27,7 +27,9 @@ class Weave:
         self._grid = grid
         width, height = profile.resolution_px
         tables = profile.phase_tables()
+        fixed = tables.fixed(views)
         columns_per_lens, lens_0 = lens_columns(profile, grid)
+        lens_0 = lens_0 + fixed.lenses * columns_per_lens
         self._pass = ScreenPass(
             device,
             "weave/weave.frag",
@@ -38,15 +40,13 @@ class Weave:
             },
         )
         self._tables = {
-            "column_table": _table(device, phase_words(tables.column[:, 0], views)),
+            "column_table": _table(device, _words(fixed.column)),
             "row_table": _table(
-                device, phase_words(tables.row, views), lens_0.astype(np.float32).view(np.uint32)
+                device, _words(fixed.row), lens_0.astype(np.float32).view(np.uint32)
             ),
         }
-        # Channels differ by the same phase in every column, so one column is stored.
-        subpixel = tables.cell + (tables.column[0] - tables.column[0, 0])
         self._uniforms: dict[str, Uniform] = {
-            "subpixel_phases": phase_words(subpixel, views).tobytes(),
+            "subpixel_phases": _words(fixed.subpixel).tobytes(),
             "columns_per_lens": columns_per_lens,
             "panel_px": (width, height),
         }
@@ -97,14 +97,10 @@ def lens_columns(profile: DisplayProfile, grid: ViewGrid) -> tuple[float, NDArra
     return grid.columns / count, grid.columns * offsets
 
 
-def phase_words(phases: NDArray[np.float64], views: int) -> NDArray[np.uint32]:
-    """Phases in lenses → [..., 2] words: whole views (signed) and 2⁻³² fractions of one."""
-    in_views = phases * views
-    whole = np.floor(in_views)
-    fraction = np.rint((in_views - whole) * 2.0**32).astype(np.uint64)
-    carry = fraction >> np.uint64(32)
-    whole_words = (whole.astype(np.int64) + carry.astype(np.int64)).astype(np.int32)
-    return np.stack([whole_words.view(np.uint32), fraction.astype(np.uint32)], axis=-1)
+def _words(phases: NDArray[np.int64]) -> NDArray[np.uint32]:
+    """Fixed phases → uint32 [..., 2]: whole views (two's complement), fraction."""
+    words = np.stack([phases >> 32, phases & 0xFFFFFFFF], axis=-1)
+    return (words & 0xFFFFFFFF).astype(np.uint32)
 
 
 def _table(

@@ -69,7 +69,8 @@ class Lfdpr:
         with clock.stage("sample"):
             for batch, points in self._batches():
                 self._sample(batch, points, band)
-                self._sample.rows(batch, points, band, 0)
+                if points.windows == 1:
+                    self._sample.rows(batch, points, band, 0)
         solid = [pair for pair in self._batches() if pair[0].alpha_mode != "blend"]
         with clock.stage("splat"):
             self._views.clear()
