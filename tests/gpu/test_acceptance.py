@@ -312,8 +312,10 @@ def test_a_ground_that_runs_under_the_viewer_is_whole(
     # that within the 1/128 px, and within far less than that the pixel's place is rounded.
     nearest, farthest = np.min(around, axis=0), np.max(around, axis=0)
     found = depths[seen] / rig.distance_mm
-    assert np.all(found >= nearest[seen] * (1 - 1e-4))
-    assert np.all(found <= farthest[seen] * (1 + 1e-4))
+    # A plane of 1e6 mm keeps 2.8e-4 (measured), from rounding of its normal.
+    bound = max(1e-4, 3e-10 * reach_mm)
+    assert np.all(found >= nearest[seen] * (1 - bound))
+    assert np.all(found <= farthest[seen] * (1 + bound))
 
 
 # ---- the two projections ----------------------------------------------------------------------
