@@ -43,8 +43,9 @@ def render_views(
     """
     triangles = placed(scene, display_from_world)
     shading = Shading(scene, triangles, np.linalg.inv(display_from_world).astype(np.float64))
-    solid = visible(triangles, rig, grid, opaque_at(shading, rig, grid))
-    blended = visible(triangles, rig, grid, over=solid)
+    accepts = opaque_at(shading, rig, grid)
+    solid = visible(triangles, rig, grid, accepts)
+    blended = visible(triangles, rig, grid, accepts, over=solid)
     linear = np.empty((rig.views, grid.rows, grid.columns, 3))
     linear[...] = background
     shade_over(linear, shading, solid, rig, grid)

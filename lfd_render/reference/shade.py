@@ -25,6 +25,7 @@ Int = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
 SMALLEST_ALPHA = 0.002  # GGX α of the smoothest surface, which keeps its highlight finite
+LEAST_ALPHA = 1 / 255  # of blended texels that show
 SRGB_ROLES = ("base_color_texture", "emissive_texture")
 
 
@@ -288,14 +289,25 @@ def _dot(a: Float64, b: Float64) -> Float64:
 
 
 def opaque_at(shading: Shading, rig: Rig, grid: ViewGrid) -> Accepts:
-    """The test that visibility asks: masks cut at their cutoff, all else counts everywhere."""
+    """The test that visibility asks: a triangle counts where its alpha reaches its cutoff."""
 
     def accepts(index: int, pixels: Pixels) -> Bool:
-        material = shading.scene.materials[int(shading.triangles.material[index])]
-        if material.alpha_mode != "mask":
+        cutoff = cutoff_of(shading.scene.materials[int(shading.triangles.material[index])])
+        if cutoff == 0.0:
             return np.ones(len(pixels.row), bool)
         ids = np.full(len(pixels.row), index)
         points = points_at(shading.triangles, rig, grid, ids, pixels)
-        return shading.alpha(points) >= material.alpha_cutoff
+        return shading.alpha(points) >= cutoff
 
     return accepts
+
+
+def cutoff_of(material: Material) -> float:
+    """Least alpha at which a material counts. Of blended ones clear texels hide nothing behind."""
+    match material.alpha_mode:
+        case "mask":
+            return material.alpha_cutoff
+        case "blend":
+            return LEAST_ALPHA
+        case _:
+            return 0.0

@@ -163,14 +163,18 @@ def soup(rng: np.random.Generator, count: int, profile: DisplayProfile) -> NDArr
 def random_scene(rng: np.random.Generator, profile: DisplayProfile, count: int) -> Scene:
     """Instances of triangle soups, mirrored and stretched ones too, of materials of each kind."""
     picture = rng.integers(0, 256, (8, 16, 4)).astype(np.uint8)
+    clear = rng.integers(-255, 256, (4, 4, 4)).clip(0).astype(np.uint8)  # half of its texels
     turn = np.array([[0.6, -0.8, 0.1], [0.8, 0.6, 0.2], [0.0, 0.0, 1.0]])
     slot = TextureSlot(0, wrap=("mirror", "clamp"), uv_transform=turn)
     materials = (
         Material("plain", (0.8, 0.5, 0.3, 1.0), metallic=0.2, roughness=0.6),
         Material("both", metallic=0.0, roughness=0.4, double_sided=True, base_color_texture=slot),
         Material("mask", alpha_mode="mask", alpha_cutoff=0.4, base_color_texture=TextureSlot(0, 1)),
-        Material("glass", (0.3, 0.9, 0.4, 0.5), alpha_mode="blend", double_sided=True, unlit=True),
-    )
+        Material(
+            "glass", (0.3, 0.9, 0.4, 0.5), alpha_mode="blend", double_sided=True, unlit=True,
+            base_color_texture=TextureSlot(1),
+        ),
+    )  # fmt: skip
     meshes, instances = [], []
     for index in range(len(materials)):
         corners = soup(rng, count, profile)
@@ -187,9 +191,8 @@ def random_scene(rng: np.random.Generator, profile: DisplayProfile, count: int) 
         instances.append(Instance(f"placed {index}", index, placement(rng)))
     instances.append(Instance("again", 0, placement(rng, mirrored=True)))
     instances.append(Instance("mirrored mask", 2, placement(rng, mirrored=True)))
-    return Scene(
-        "random", tuple(meshes), tuple(instances), materials, images=(Image("noise", picture),)
-    )
+    images = (Image("noise", picture), Image("clear", clear))
+    return Scene("random", tuple(meshes), tuple(instances), materials, images)
 
 
 def placement(rng: np.random.Generator, *, mirrored: bool = False) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lfd_render.display import DisplayProfile, Rig, ViewGrid
 from lfd_render.gpu.device import Device
-from lfd_render.reference import Visibility, shade, studio, textures
+from lfd_render.reference import Visibility, shade, studio, textures, visible
 from lfd_render.reference.pipeline import shade_over
 from lfd_render.reference.shade import Shading
 from lfd_render.scene import Image, Instance, Material, Scene, TextureSlot
@@ -244,13 +244,18 @@ def test_glass_lies_over_what_is_solid(device: Device, rng: np.random.Generator)
     meshes, instances = [], []
     triangle = np.array([[[-60.0, -40, 0], [60, -40, 0], [0, 60, 0]]])
     uv = np.repeat(triangle[:, :, None, :2] / 120.0, 2, axis=2)
+    picture = smooth(rng).pixels.copy()
+    picture[:, :16, 3] = 0  # a clear half, through which the next pane shows
     for index, (z, kind) in enumerate(((0.0, 1), (40.0, 0), (20.0, 0), (-30.0, 0))):
         meshes.append(mesh_of(shifted(triangle, 8 * index, 4 * index, z), kind, texcoords=uv))
         instances.append(Instance(str(index), index, np.eye(4)))
-    scene = Scene("glass", tuple(meshes), tuple(instances), (glass, solid), (smooth(rng),))
+    scene = Scene("glass", tuple(meshes), tuple(instances), (glass, solid), (Image("p", picture),))
     case = case_of(device, scene, *views())
     assert set(np.unique(case.blended.ids)) == {1, 2, 3, 0xFFFFFFFF}
     assert case.error().max() < texture_tolerance(1.0)
+    # The planted fault of clear texels that hide the next pane.
+    hidden = visible(case.shading.triangles, case.rig, case.grid, over=case.solid)
+    assert np.count_nonzero(hidden.ids != case.blended.ids) > 50
 
 
 # ---- everything at once -----------------------------------------------------------------------

@@ -334,5 +334,9 @@ def test_normals_stay_square_to_their_surfaces(rng: np.random.Generator) -> None
     np.testing.assert_allclose(np.linalg.norm(turned, axis=1), 1.0)
     as_points = unit(normals @ matrix[:3, :3].T)
     assert np.abs(np.einsum("nx,nkx->nk", as_points, moved)).max() > 0.1
+    # A mirror turns corners round and leaves normals on their side.
+    mirrored = normals_by(np.diag([-1.0, 1.0, 1.0, 1.0]), normals)
+    np.testing.assert_allclose(mirrored, normals * [-1.0, 1.0, 1.0])
     flattened = np.diag([1.0, 1.0, 0.0, 1.0])
-    np.testing.assert_allclose(normals_by(flattened, normals), normals)
+    facing = np.sign(normals[:, 2:]) * [0.0, 0.0, 1.0]
+    np.testing.assert_allclose(normals_by(flattened, normals), facing)
