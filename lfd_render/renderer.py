@@ -31,6 +31,7 @@ REPEAT_TURN_RAD = np.deg2rad(0.5)  # how far the scene turns between repeated fr
 TECHNIQUES = ("lfdpr", "mvr")
 PRESETS = ("default", "paper")
 PROJECTIONS = ("shear", "general")
+MOST_VIEWS = 1024
 MOST_RADIANCE = 65504.0  # what half floats hold
 MOST_VIEW_PIXELS = 1 << 32  # of all views together: hours on a processor, and far above any panel
 
@@ -64,8 +65,8 @@ class RenderOptions:
             raise UsageError(
                 f"projection '{self.projection}': unknown; use {' or '.join(PROJECTIONS)}"
             )
-        if self.views is not None and not 1 <= self.views <= 1024:
-            raise UsageError(f"views: {self.views} is out of range; use 1 to 1024")
+        if self.views is not None and not 1 <= self.views <= MOST_VIEWS:
+            raise UsageError(f"views: {self.views} is out of range; use 1 to {MOST_VIEWS}")
         if self.view_size is not None and not all(1 <= n <= 16384 for n in self.view_size):
             raise UsageError(f"view size: {self.view_size} is out of range; use 1 to 16384 a side")
         if len(self.background) != 3 or not all(0 <= c <= MOST_RADIANCE for c in self.background):
@@ -110,6 +111,8 @@ class Renderer:
     """
 
     def __init__(self, device: str | Device = "auto") -> None:
+        if not isinstance(device, str | Device):
+            raise UsageError(f"device: {device!r}; give 'auto', 'gpu', 'software', '0' or a Device")
         self._owns_device = isinstance(device, str)
         self.device = Device.open(device) if isinstance(device, str) else device
         self._scene: Scene | None = None
@@ -191,6 +194,8 @@ class Renderer:
         }
         self.device.check()
         frames.release()
+        if choice.technique == "lfdpr" and report["points"] == 0:
+            report["warnings"].append("nothing of the scene can be seen through the window")
         metadata = {
             "lfd:profile": display.name,
             "lfd:profile-hash": display.hash,
@@ -369,6 +374,8 @@ def _grid(display: DisplayProfile, choice: RenderOptions, views: int) -> ViewGri
 
 def _check_size(grid: ViewGrid, views: int) -> None:
     """Raise ResourceError for more view pixels than anyone waits for."""
+    if views > MOST_VIEWS:
+        raise UsageError(f"views: {views} is out of range; use 1 to {MOST_VIEWS}")
     pixels = views * grid.columns * grid.rows
     if pixels > MOST_VIEW_PIXELS:
         raise ResourceError(

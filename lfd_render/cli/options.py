@@ -69,7 +69,10 @@ ViewSizeOption = Annotated[
 ]
 TechniqueOption = Annotated[Technique, typer.Option(help="Rendering technique.")]
 PresetOption = Annotated[
-    Preset, typer.Option(help="default: our best; paper: every choice as the paper has it.")
+    Preset,
+    typer.Option(
+        help="default: our best; paper: the paper's upright views and stochastic culling."
+    ),
 ]
 CameraOption = Annotated[
     str | None,

@@ -70,7 +70,8 @@ def render(
         write_picture(output, eia.save)
 
     for warning in eia.report["warnings"]:
-        warn(f"{scene}: {warning}")
+        if warning not in loaded.warnings:  # those were said when it was loaded
+            warn(f"{scene}: {warning}")
     load_ms, encode_ms = watch.timings_ms["load"], watch.timings_ms["encode"]
     watch.timings_ms = {"load": load_ms, **eia.report["timings_ms"], "encode": encode_ms}
     if json:

@@ -83,7 +83,10 @@ class Device:
                 software_index = device.info.egl_index
             device.close()
         if choice != "auto" or software_index is None:
-            raise GpuError(f"device '{choice}': no such EGL device found; {INSTALL_HINT}")
+            raise GpuError(
+                f"device '{choice}': EGL offers no {'software' if choice == 'software' else 'GPU'} "
+                "device here; use auto, or see what there is with 'lfd-render doctor'"
+            )
         return cls(_egl_context(software_index), software_index)
 
     @property

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lfd_render.errors import OutputError
 from lfd_render.panel.picture import write_png
 
 
@@ -27,4 +28,6 @@ class Eia:
 
         Raises OutputError when it cannot be written; no partial file is left.
         """
+        if Path(path).suffix.lower() != ".png":
+            raise OutputError(f"{path}: an EIA is written as .png; give a name that ends so")
         write_png(path, self.pixels, self.metadata)

@@ -13,7 +13,7 @@ from lfd_render.passes.screen import ScreenPass
 
 
 class Encode:
-    """Linear texture layer → uint8 picture: exposure, Khronos PBR Neutral tone curve, sRGB."""
+    """Linear texture layer → uint8 picture: exposure, tone curve, sRGB."""
 
     def __init__(self, device: Device, width: int, height: int) -> None:
         self._pass = ScreenPass(device, "encode/encode.frag")

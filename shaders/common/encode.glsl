@@ -1,19 +1,12 @@
 // Scene-linear light to a picture: exposure, tone curve, sRGB.
 
-// Khronos PBR Neutral tone curve: true to base colours below the shoulder, desaturating above it
-// (Khronos 2024, "PBR Neutral tone mapping specification").
-vec3 neutral_tone(vec3 color) {
-    const float SHOULDER = 0.8 - 0.04, DESATURATION = 0.15;
-    float least = min(color.r, min(color.g, color.b));
-    float offset = least < 0.08 ? least - 6.25 * least * least : 0.04;
-    color -= offset;
-    float peak = max(color.r, max(color.g, color.b));
-    if (peak < SHOULDER) return color;
-    float range = 1.0 - SHOULDER;
-    float compressed = 1.0 - range * range / (peak + range - SHOULDER);
-    color *= compressed / peak;
-    float white = 1.0 - 1.0 / (DESATURATION * (peak - compressed) + 1.0);
-    return mix(color, vec3(compressed), white);
+// Tone curve: true to light below the shoulder, bright light approaches 1 above it, with no kink between.
+// Each channel by itself: the three subpixels of a panel pixel belong to different views, and a curve
+// that mixed them would let what one view sees colour another.
+vec3 shouldered(vec3 light) {
+    const float SHOULDER = 0.8, ROOM = 1.0 - SHOULDER;
+    vec3 above = 1.0 - ROOM * ROOM / (max(light, SHOULDER) + ROOM - SHOULDER);
+    return mix(light, above, greaterThan(light, vec3(SHOULDER)));
 }
 
 // sRGB transfer function (IEC 61966-2-1).
@@ -25,5 +18,5 @@ vec3 srgb_from_linear(vec3 linear) {
 
 vec3 encoded(vec3 radiance, float exposure) {
     vec3 exposed = min(max(radiance, 0.0) * exposure, 65504.0);  // infinite light has no tone
-    return srgb_from_linear(clamp(neutral_tone(exposed), 0.0, 1.0));
+    return srgb_from_linear(clamp(shouldered(exposed), 0.0, 1.0));
 }

@@ -60,7 +60,9 @@ def test_views_differ_by_parallax(scene: Path, display: Path, tmp_path: Path) ->
 def test_an_interrupted_render_leaves_nothing(
     number: signal.Signals, code: int, scene: Path, tmp_path: Path
 ) -> None:
-    command = [sys.executable, "-m", "lfd_render.cli.main", "render", str(scene)]
+    # Not by -m, which now and then ends by the signal itself after the handler has run.
+    script = "import sys; from lfd_render.cli.main import main; sys.exit(main())"
+    command = [sys.executable, "-c", script, "render", str(scene)]
     command += ["-o", str(tmp_path / "eia.png"), "--views", "2", "--repeat", "1000000"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None

@@ -136,6 +136,7 @@ def explain(
     limit_mm: NDArray[np.float64] | None = None,
     blended: bool = False,
     general: bool = False,
+    snap_px: float = 0.0,
 ) -> Explained:
     """Judge each pixel that shows another triangle than expected.
 
@@ -143,7 +144,8 @@ def explain(
     it covers it or misses by less. What is found is explained when it possibly covers the pixel and
     is, depth band and all, no farther than all that certainly does. shading: for cutoffs, since
     alpha may be off by ALPHA_TOLERANCE; limit_mm: depths [row, view, column] that hide what is
-    behind them, for blended triangles.
+    behind them, for blended triangles; snap_px: how far hardware moves corners to a raster of its
+    own, which moves edges by as much and depths by the plane's slope.
     """
     flips = Pixels(*np.nonzero(found != expected.ids))
     shown = found[flips.row, flips.view, flips.column]
@@ -157,7 +159,7 @@ def explain(
         limit = certain_mm.copy()
     for index in np.flatnonzero(triangles.blended == blended).tolist() if count else ():
         certainly, possibly, depths, band_mm = _coverage(
-            triangles, index, rig, grid, flips, shading, general
+            triangles, index, rig, grid, flips, shading, general, snap_px
         )
         is_shown = shown == index
         possible |= is_shown & possibly
@@ -178,6 +180,7 @@ def _coverage(
     pixels: Pixels,
     shading: Shading,
     general: bool,
+    snap_px: float,
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
     """Whether a triangle certainly and possibly covers pixels, its depths there and their bands."""
     corners = triangles.p_display[index]
@@ -186,7 +189,7 @@ def _coverage(
     inside = covers(meeting, triangles, index, rig.near_mm)
     distance_px, k = boundary_distance(corners, rig, grid, pixels)
     if distance_px.shape[1]:
-        doubtful = (distance_px <= edge_band_px(corners, k, rig, grid)).any(axis=1)
+        doubtful = (distance_px <= edge_band_px(corners, k, rig, grid) + snap_px).any(axis=1)
     else:
         doubtful = np.zeros(len(ids), bool)
     lowest = max(rig.near_mm, float(rig.distance_mm - corners[:, 2].max()))
@@ -194,6 +197,8 @@ def _coverage(
     depths = np.nan_to_num(meeting.depths, nan=lowest)
     depths = np.clip(depths, min(lowest, highest), highest)
     band_mm = depth_band_mm(triangles, ids, rig, grid, pixels, general=general)
+    if snap_px:
+        band_mm = band_mm + snap_px * _depth_per_pixel(meeting, depths, grid)
     certainly, possibly = inside & ~doubtful, inside | doubtful
     cutoff = cutoff_of(shading.scene.materials[int(triangles.material[index])])
     if cutoff > 0.0:
@@ -202,3 +207,17 @@ def _coverage(
         certainly &= alpha >= cutoff + ALPHA_TOLERANCE
         possibly &= alpha >= cutoff - ALPHA_TOLERANCE
     return certainly, possibly, depths, band_mm
+
+
+def _depth_per_pixel(
+    meeting: Meeting, depths: NDArray[np.float64], grid: ViewGrid
+) -> NDArray[np.float64]:
+    """How fast depths change over a column and a row together, [pixel] mm."""
+    steps_mm = (grid.column_mm, grid.panel_mm[1] / grid.rows)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slopes = [
+            np.abs(step * meeting.normals[..., axis].sum(axis=-1) / meeting.whole)
+            for axis, step in enumerate(steps_mm)
+        ]
+    # k = D/d is linear in the window point.
+    return np.nan_to_num(sum(slopes) * depths**2 / meeting.distance_mm, nan=np.inf)

@@ -85,7 +85,7 @@ def _clipped(color: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize(
-    ("name", "fault"), [("srgb_from_linear", _power), ("neutral", _clipped), ("DESATURATION", 0.2)]
+    ("name", "fault"), [("srgb_from_linear", _power), ("shouldered", _clipped), ("SHOULDER", 0.7)]
 )
 def test_wrong_encodings_are_caught(
     device: Device,

@@ -325,6 +325,7 @@ def test_words_do_not_depend_on_the_division_of_work(device: Device, seed: int, 
     assert_same(whole, divided(device, scene, rig, grid))  # nor on the run
     assert_same(whole, divided(device, scene, rig, grid, band_rows=7))
     assert_same(whole, divided(device, scene, rig, grid, window_items=17))
+    assert_same(whole, divided(device, scene, rig, grid, band_rows=7, window_items=17))
     assert_same(whole, divided(device, scene, rig, grid, batch_triangles=8))
     assert_same(
         whole,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lfd_render.display import Camera, DisplayProfile, ViewGrid
-from lfd_render.reference import encode, encoded, render_eia, render_views, woven
-from lfd_render.reference.encode import encoded_float, neutral, srgb_from_linear
+from lfd_render.reference import encoded, render_eia, render_views, woven
+from lfd_render.reference.encode import encoded_float, shouldered, srgb_from_linear
 from lfd_render.reference.weave import view_of
 from lfd_render.scene import Material
 
@@ -78,31 +78,32 @@ def test_both_grids_show_a_ramp_at_the_lens_centres() -> None:
 
 def test_known_levels() -> None:
     assert encoded(np.zeros((1, 3))).tolist() == [[0, 0, 0]]
-    # Grey ½ loses the Fresnel 0.04: 0.46 is level 181.
-    assert encoded(np.full((1, 3), 0.5)).tolist() == [[181, 181, 181]]
+    assert encoded(np.full((1, 3), 0.5)).tolist() == [[188, 188, 188]]
     np.testing.assert_allclose(srgb_from_linear(np.array([0.0, 0.0031308, 0.5, 1.0])),
                                [0.0, 0.04045, 0.735357, 1.0], rtol=1e-4)  # fmt: skip
     assert encoded(np.full((1, 3), 1e6)).tolist() == [[255, 255, 255]]
 
 
 def test_the_tone_curve_is_true_below_its_shoulder_and_keeps_order_above() -> None:
-    red = np.array([[0.6, 0.2, 0.1]])
-    np.testing.assert_allclose(neutral(red), red - 0.04)
-    greys = np.repeat(np.geomspace(1e-4, 1e5, 500)[:, None], 3, axis=1)
-    curve = neutral(greys)[:, 0]
+    dim = np.array([[0.6, 0.2, 0.1]])
+    np.testing.assert_array_equal(shouldered(dim), dim)
+    curve = shouldered(np.geomspace(1e-4, 1e5, 500))
     assert np.all(np.diff(curve) > 0)
     assert 0.99 < curve[-1] < 1.0
-    # The two halves meet: without a step at the shoulder.
-    at = np.repeat(np.array([[0.8 - 1e-9], [0.8 + 1e-9]]), 3, axis=1)
-    np.testing.assert_allclose(neutral(at)[0], neutral(at)[1], atol=1e-8)
-    bright = neutral(np.array([[10.0, 1.0, 1.0]]))[0]
-    assert 0.4 < bright[1] < bright[0] < 1.0  # a bright red turns white, not orange
+    # The two parts meet, and so do their slopes.
+    at = 0.8 + np.array([-2e-6, -1e-6, 1e-6, 2e-6])
+    np.testing.assert_allclose(shouldered(at), at, atol=1e-10)
+
+
+def test_the_tone_curve_keeps_channels_apart() -> None:
+    """They belong to different views."""
+    bright = shouldered(np.array([[10.0, 0.0, 0.3]]))
+    np.testing.assert_array_equal(bright[0, 1:], [0.0, 0.3])
 
 
 def test_exposure_multiplies_light() -> None:
     light = np.array([[0.1, 0.2, 0.3]])
     np.testing.assert_allclose(encoded_float(light, 2.0), encoded_float(2 * light))
-    assert encode.START + encode.FRESNEL == 0.8
 
 
 # ---- the whole way ----------------------------------------------------------------------------
@@ -114,7 +115,7 @@ def test_a_wall_fills_the_panel() -> None:
         mesh_of(square(2000.0, 0.0)), materials=(Material("m", (0.5, 0.5, 0.5, 1.0), unlit=True),)
     )
     camera = Camera((0, 0, 0), (0, 0, 1), (0, 1, 0), profile.size_mm[1])
-    assert set(np.unique(render_eia(wall, profile, camera))) == {181}
+    assert set(np.unique(render_eia(wall, profile, camera))) == {188}
     away = Camera((0, 0, 0), (0, 0, -1), (0, 1, 0), profile.size_mm[1])
     empty = render_eia(wall, profile, away, background=(0.5, 0.5, 0.0))
     assert empty.shape == (54, 96, 3)
