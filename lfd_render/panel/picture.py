@@ -65,6 +65,8 @@ def write_png(path: str | Path, pixels: Pixels, text: dict[str, str] | None = No
 def _opened(path: Path) -> Iterator[Image.Image]:
     """A picture of an accepted kind and size; whatever goes wrong is a PictureError."""
     kinds = ", ".join(READABLE)
+    if path.is_fifo():  # opening one waits for whoever may never write
+        raise PictureError(f"{path}: is a pipe; give a regular file")
     try:
         with ExitStack() as stack:
             with warnings.catch_warnings():

@@ -127,3 +127,10 @@ def test_a_failed_write_keeps_the_file_before_it(
 def test_other_pixels_are_refused(tmp_path: Path, pixels: np.ndarray) -> None:
     with pytest.raises(UsageError, match=r"they should be uint8 \[y, x, 3\]"):
         write_png(tmp_path / "a.png", pixels)
+
+
+def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.png"
+    os.mkfifo(pipe)
+    with pytest.raises(PictureError, match="is a pipe"):
+        read_picture(pipe)
