@@ -64,9 +64,9 @@ def rasterised(device: Device, scene: Scene, rig: Rig, grid: ViewGrid) -> NDArra
 
 
 def window_only(expected: Visibility, grid: ViewGrid) -> Visibility:
-    """Hardware draws no further than the window; columns along lenses stick out of it."""
+    """Hardware draws two columns beyond the window; sheared grids stick out further."""
     x = np.arange(grid.columns) + 0.5 - grid.row_offset[:, None]
-    outside = np.abs(x * grid.column_mm) > 0.5 * grid.panel_mm[0]
+    outside = np.abs(x * grid.column_mm) > 0.5 * grid.panel_mm[0] + 2.0 * grid.column_mm
     ids = np.where(outside[:, None], NO_TRIANGLE, expected.ids).astype(np.uint32)
     return Visibility(ids, expected.depths)
 

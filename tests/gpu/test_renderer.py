@@ -232,3 +232,18 @@ def test_views_on_a_boundary_and_far_centres_are_exact(
 def test_a_picture_larger_than_the_device_is_a_resource_error(device: Device) -> None:
     with pytest.raises(ResourceError, match="picture"):
         Encode(device, device.info.max_texture_size + 1, 8)
+
+
+@pytest.mark.parametrize("technique", ["lfdpr", "mvr"])
+def test_a_wall_beyond_the_window_fills_the_panel(
+    device: Device, display: DisplayProfile, technique: str
+) -> None:
+    """Lenses that begin outside the window included."""
+    mesh, material = card(0.0, (1.0, 1.0, 1.0, 1.0), "wall")
+    wide = dataclasses.replace(mesh, positions=mesh.positions * np.float32(9.0))
+    solid = dataclasses.replace(material, alpha_mode="opaque")
+    scene = Scene("wall", (wide,), (Instance("wall", 0, np.eye(4)),), (solid,))
+    camera = Camera((0, 0, 0), (0, 0, 1), (0, 1, 0), display.size_mm[1])
+    with Renderer(device) as renderer:
+        pixels = renderer.render(scene, display, camera, views=48, technique=technique).pixels
+    assert pixels.min() > 200
