@@ -102,9 +102,10 @@ def test_hardware_sees_the_nearest_triangles(device: Device, seed: int) -> None:
     scene, rig, grid = random_views(seed)
     found = rasterised(device, scene, rig, grid)
     differ, unexplained = judged(found, scene, rig, grid)
-    assert differ <= 0.01 * found.size
-    # A sliver's plane turns when its corners are snapped, so its depths may be off by more.
-    assert unexplained <= 2 + 5e-4 * found.size
+    assert differ <= 2 + 2e-3 * found.size  # 0.05 % measured over 20 scenes
+    # A sliver's plane turns when its corners are snapped, so its depths may be off by more: a pixel
+    # of 120,000 measured.
+    assert unexplained <= 2
     assert (found != NO_TRIANGLE).mean() > 0.05
 
 
@@ -113,7 +114,7 @@ def test_a_raster_a_tenth_of_a_pixel_aside_is_caught(device: Device) -> None:
         scene, rig, grid = random_views(seed)
         found = rasterised(device, scene, rig, grid)
         moved = ViewGrid(**{**vars(grid), "row_offset": grid.row_offset + 0.1})
-        assert judged(found, scene, rig, moved)[1] > 2 + 5e-4 * found.size
+        assert judged(found, scene, rig, moved)[1] > 10
 
 
 def test_bands_leave_no_seam(device: Device) -> None:
