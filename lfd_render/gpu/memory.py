@@ -93,6 +93,8 @@ class Buffer(Owned):
 
     def read(self, dtype: DTypeLike, count: int = -1) -> NDArray[Any]:
         """The first `count` elements (all by default) as an array. Waits for the device."""
+        if count == 0:  # OpenGL maps no empty ranges
+            return np.empty(0, dtype)
         size = -1 if count < 0 else count * np.dtype(dtype).itemsize
         return np.frombuffer(self.glo.read(size), dtype=dtype)
 

@@ -157,7 +157,6 @@ class Sample:
             {
                 "segment_count": segments,
                 "view_blocks": -(-band.target.rig.views // self._view_lanes),
-                "windows": points.windows,
                 "window_items": points.window_items,
             },
         )

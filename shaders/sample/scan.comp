@@ -14,7 +14,6 @@ layout(std430) restrict buffer MostItems { uint most_items; };  // over all call
 
 uniform uint segment_count;
 uniform uint view_blocks;
-uniform uint windows;
 uniform uint window_items;
 
 shared uvec2 sums[THREADS];
@@ -46,7 +45,9 @@ void main() {
     if (thread == THREADS - 1u) {
         uvec2 total = sums[thread];
         atomicMax(most_items, total.y);
-        for (uint w = 0u; w < windows; w++) {
+        // Not a uniform: Mesa makes uniforms that bound loops constants, and zink's Mesa 22.3 does not
+        // see them change.
+        for (uint w = 0u; w < uint(work.length()); w++) {
             uint begin = min(w * window_items, total.y), items = min(window_items, total.y - begin);
             uint groups = (items + 63u) / 64u, splats = (items + GROUP_ROWS - 1u) / GROUP_ROWS;
             work[w] = Work(

@@ -170,6 +170,15 @@ def test_fill_sets_every_word(device: Device) -> None:
     buffer.release()
 
 
+def test_reading_nothing_gives_nothing(device: Device) -> None:
+    buffer = Buffer.of(device, "test", np.arange(3, dtype=np.uint32))
+    nothing = buffer.read(np.uint32, 0)
+    assert (nothing.dtype, nothing.shape) == (np.uint32, (0,))
+    device.check()
+    np.testing.assert_array_equal(buffer.read(np.uint32, 2), [0, 1])
+    buffer.release()
+
+
 def test_stage_times_add_up_to_the_wall_clock(device: Device) -> None:
     clock = StageClock(device)
     start = time.perf_counter()
