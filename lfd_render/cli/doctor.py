@@ -114,6 +114,8 @@ def _limits(device: Device) -> dict[str, Any]:
         "texture_units": device.info.max_texture_units,
         "array_layers": device.info.max_array_layers,
         "texture_size": device.info.max_texture_size,
+        "texture_bytes": device.info.max_texture_bytes,
+        "texture_budget_bytes": device.info.texture_budget_bytes,
         "work_groups": list(context["GL_MAX_COMPUTE_WORK_GROUP_COUNT"]),
         "work_group_size": list(context["GL_MAX_COMPUTE_WORK_GROUP_SIZE"]),
         "work_group_invocations": context["GL_MAX_COMPUTE_WORK_GROUP_INVOCATIONS"],

@@ -15,7 +15,7 @@ import glcontext
 import moderngl
 
 from lfd_render.errors import GpuError, ResourceError
-from lfd_render.gpu.memory import Ledger, Owned
+from lfd_render.gpu.memory import Ledger, Owned, texture_bytes
 from lfd_render.gpu.raw import ERRORS, MAX_COMPUTE_SHADER_STORAGE_BLOCKS, OUT_OF_MEMORY, RawGl
 
 REQUIRED_VERSION = 450
@@ -44,6 +44,8 @@ class DeviceInfo:
     max_texture_size: int
     max_groups: int
     max_storage_blocks: int  # of a compute shader
+    max_texture_bytes: int  # of one texture with its mip levels
+    texture_budget_bytes: int  # of all textures of a scene
 
 
 class Device:
@@ -143,12 +145,14 @@ class Device:
 def _describe(context: moderngl.Context, raw: RawGl, egl_index: int) -> DeviceInfo:
     info = context.info
     renderer = str(info["GL_RENDERER"])
+    software = any(name in renderer.lower() for name in SOFTWARE_RENDERERS)
+    max_texture_bytes, texture_budget_bytes = texture_bytes(context.extensions, raw, software)
     return DeviceInfo(
         renderer=renderer,
         vendor=str(info["GL_VENDOR"]),
         version=str(info["GL_VERSION"]),
         egl_index=egl_index,
-        software=any(name in renderer.lower() for name in SOFTWARE_RENDERERS),
+        software=software,
         extensions=frozenset(context.extensions),
         max_storage_bytes=int(info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"]),
         max_texture_units=int(info["GL_MAX_TEXTURE_IMAGE_UNITS"]),
@@ -156,6 +160,8 @@ def _describe(context: moderngl.Context, raw: RawGl, egl_index: int) -> DeviceIn
         max_texture_size=int(info["GL_MAX_TEXTURE_SIZE"]),
         max_groups=int(info["GL_MAX_COMPUTE_WORK_GROUP_COUNT"][0]),
         max_storage_blocks=raw.integer(MAX_COMPUTE_SHADER_STORAGE_BLOCKS),
+        max_texture_bytes=max_texture_bytes,
+        texture_budget_bytes=texture_budget_bytes,
     )
 
 

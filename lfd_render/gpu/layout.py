@@ -5,6 +5,8 @@ A field list gives the numpy dtype (``dtype("Draw")``) and the GLSL text that a 
 and `dtype` asserts it.
 """
 
+from functools import cache
+
 import numpy as np
 
 # GLSL type → (numpy base type, count of components, std430 alignment in bytes)
@@ -136,6 +138,7 @@ CONSTANTS: dict[str, int] = {
 }
 
 
+@cache
 def dtype(name: str) -> np.dtype[np.void]:
     """The numpy dtype of a struct, byte for byte its std430 layout."""
     fields = []

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+import os
+from collections.abc import Collection, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import moderngl
@@ -15,6 +17,32 @@ from lfd_render.gpu import raw as gl
 
 if TYPE_CHECKING:
     from lfd_render.gpu.device import Device
+
+
+_SOFTWARE_TEXTURE_BYTES = 1 << 30  # lavapipe allocates no more at once, llvmpipe twice that
+_CGROUP_LIMIT = Path("/sys/fs/cgroup/memory.max")
+
+
+def texture_bytes(extensions: Collection[str], raw: gl.RawGl, software: bool) -> tuple[int, int]:
+    """Bytes that one texture, and all textures of a scene, may take on a device.
+
+    All: half of its own memory where it tells; a quarter of main memory where that is what it uses
+    or where nothing is known. One: half of all, and what software devices allocate at once.
+    """
+    if "GL_NVX_gpu_memory_info" in extensions:
+        budget = raw.integer(gl.GPU_MEMORY_INFO_DEDICATED_VIDMEM_NVX) * 1024 // 2
+    else:
+        budget = main_memory_bytes() // 4
+    return min(budget // 2, _SOFTWARE_TEXTURE_BYTES if software else budget), budget
+
+
+def main_memory_bytes() -> int:
+    """The machine's memory, or this process's share where its control group has a limit."""
+    total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    try:
+        return min(total, int(_CGROUP_LIMIT.read_text()))
+    except (OSError, ValueError):  # no such file, or "max"
+        return total
 
 
 class Owned:
@@ -152,13 +180,25 @@ class TextureArray(Owned):
         device.raw.glTextureStorage3D(self.name, levels, internal_format, width, height, layers)
         device.check()
 
-    def upload(self, layer: int, pixels: NDArray[np.uint8]) -> None:
-        """Set level 0 of a layer from uint8 [y, x, 4]."""
-        assert pixels.shape == (self.height, self.width, 4)
+    def upload(self, layer: int, pixels: NDArray[np.uint8], top: int = 0) -> None:
+        """Set rows of level 0 of a layer, from row `top` on, from uint8 [y, x, 4]."""
+        rows = len(pixels)
+        assert pixels.shape == (rows, self.width, 4)
+        assert top + rows <= self.height
         data = np.ascontiguousarray(pixels)
         self._device.raw.glTextureSubImage3D(
-            self.name, 0, 0, 0, layer, self.width, self.height, 1,
+            self.name, 0, 0, top, layer, self.width, rows, 1,
             gl.RGBA, gl.UNSIGNED_BYTE, data.ctypes.data,
+        )  # fmt: skip
+
+    def copy_level(self, source: TextureArray, level: int, layer: int, top: int) -> None:
+        """Set rows of level 0 of a layer, from row `top` on, from a level of a source's layer 0."""
+        width, height = max(1, source.width >> level), max(1, source.height >> level)
+        assert width == self.width
+        assert top + height <= self.height
+        self._device.raw.glCopyImageSubData(
+            source.name, gl.TEXTURE_2D_ARRAY, level, 0, 0, 0,
+            self.name, gl.TEXTURE_2D_ARRAY, 0, 0, top, layer, width, height, 1,
         )  # fmt: skip
 
     def generate_mipmaps(self) -> None:

@@ -53,6 +53,7 @@ LESS = 0x0201
 
 OUT_OF_MEMORY = 0x0505
 MAX_COMPUTE_SHADER_STORAGE_BLOCKS = 0x90DB
+GPU_MEMORY_INFO_DEDICATED_VIDMEM_NVX = 0x9047  # KiB
 
 ERRORS = {
     0x0500: "GL_INVALID_ENUM",
@@ -76,6 +77,7 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "glTextureSubImage2D": (None, (_u, _i, _i, _i, _i, _i, _u, _u, _p)),
     "glTextureStorage3D": (None, (_u, _i, _u, _i, _i, _i)),
     "glTextureSubImage3D": (None, (_u, _i, _i, _i, _i, _i, _i, _i, _u, _u, _p)),
+    "glCopyImageSubData": (None, (_u, _u, _i, _i, _i, _i, _u, _u, _i, _i, _i, _i, _i, _i, _i)),
     "glTextureParameteri": (None, (_u, _u, _i)),
     "glGenerateTextureMipmap": (None, (_u,)),
     "glClearNamedBufferData": (None, (_u, _u, _u, _u, _p)),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -135,6 +136,8 @@ class SceneBuffers:
             scale = np.maximum(np.abs(normal).max(axis=(1, 2), keepdims=True), 1e-300)
             self._records[f"normal_matrix_{field}"][:, :3] = (normal / scale)[:, :, axis]
         self._records["material"] = [scene.meshes[i.mesh].material for i in scene.instances]
+        sided = np.array([m.double_sided for m in scene.materials])
+        self._double_sided = sided[self._records["material"]]
         self.draws = Buffer(device, "draws", self._records.nbytes)
         self.materials = Buffer.of(device, "materials", _material_records(scene))
         self.slots = Buffer.of(device, "materials", self.textures.slots)
@@ -157,9 +160,8 @@ class SceneBuffers:
             matrices.transpose(0, 2, 1).reshape(-1, 16).astype(np.float32)
         )
         mirrored = np.linalg.det(matrices[:, :3, :3]) < 0.0
-        sided = [self._material(draw).double_sided for draw in range(len(self._records))]
         self._records["facing"] = np.where(mirrored, CONSTANTS["FACING_MIRRORED"], 0) | np.where(
-            sided, CONSTANTS["FACING_BOTH"], 0
+            self._double_sided, CONSTANTS["FACING_BOTH"], 0
         )
         self.draws.write(self._records)
 
@@ -191,8 +193,8 @@ class SceneBuffers:
         """Texture arrays, by sampler name."""
         return {"srgb_maps": self.textures.srgb, "linear_maps": self.textures.linear}
 
-    def constants(self) -> dict[str, int]:
-        """Macros of the shaders that read vertices or materials: what this scene has."""
+    @cached_property
+    def _constants(self) -> dict[str, int]:
         materials = self.scene.materials
         roles = 0
         for bit, role in enumerate(TEXTURE_ROLES):
@@ -208,8 +210,9 @@ class SceneBuffers:
             "SHARED_OCCLUSION": int(all(_shares_occlusion(m) for m in materials)),
         }
 
-    def _material(self, draw: int) -> Material:
-        return self.scene.materials[int(self._records["material"][draw])]
+    def constants(self) -> dict[str, int]:
+        """Macros of the shaders that read vertices or materials: what this scene has."""
+        return self._constants
 
     def release(self) -> None:
         """Free everything."""
@@ -305,34 +308,43 @@ def _octahedral(normals: NDArray[np.float32]) -> NDArray[np.uint32]:
 
 
 def _material_records(scene: Scene) -> NDArray[np.void]:
-    records = np.zeros(len(scene.materials), dtype("Material"))
-    for record, material in zip(records, scene.materials, strict=True):
-        red, green, blue, alpha = material.base_color
-        record["base_color_rg"] = _unorm16x2(red, green)
-        record["base_color_ba"] = _unorm16x2(blue, alpha)
-        record["emissive_rg"] = _half2(*material.emissive[:2])
-        cutoff = _LEAST_ALPHA if material.alpha_mode == "blend" else material.alpha_cutoff
-        record["emissive_b_cutoff"] = _half2(material.emissive[2], cutoff)
-        record["metallic_roughness"] = _unorm16x2(material.metallic, material.roughness)
-        normal, occlusion = material.normal_texture, material.occlusion_texture
-        record["normal_occlusion"] = _half2(
-            normal.scale if normal else 1.0, occlusion.scale if occlusion else 1.0
-        )
-        record["flags"] = CONSTANTS["UNLIT"] if material.unlit else 0
-        for slot in material.texture_slots().values():
-            height, width = scene.images[slot.image].pixels.shape[:2]
-            stretch = 1.0 if slot.uv_transform is None else np.linalg.det(slot.uv_transform[:2, :2])
-            field = f"texels_uv{slot.texcoord}"
-            record[field] = max(record[field], abs(stretch) * width * height)
+    materials = scene.materials
+    records = np.zeros(len(materials), dtype("Material"))
+    color = np.array([m.base_color for m in materials])
+    emissive = np.array([m.emissive for m in materials])
+    cutoff = [_LEAST_ALPHA if m.alpha_mode == "blend" else m.alpha_cutoff for m in materials]
+    surface = np.array([(m.metallic, m.roughness) for m in materials])
+    normal = [m.normal_texture.scale if m.normal_texture else 1.0 for m in materials]
+    occlusion = [m.occlusion_texture.scale if m.occlusion_texture else 1.0 for m in materials]
+    records["base_color_rg"] = _unorm16x2(color[:, 0], color[:, 1])
+    records["base_color_ba"] = _unorm16x2(color[:, 2], color[:, 3])
+    records["emissive_rg"] = _half2(emissive[:, 0], emissive[:, 1])
+    records["emissive_b_cutoff"] = _half2(emissive[:, 2], np.array(cutoff))
+    records["metallic_roughness"] = _unorm16x2(surface[:, 0], surface[:, 1])
+    records["normal_occlusion"] = _half2(np.array(normal), np.array(occlusion))
+    records["flags"] = [CONSTANTS["UNLIT"] if m.unlit else 0 for m in materials]
+    texels = _texels(scene)
+    records["texels_uv0"], records["texels_uv1"] = texels[:, 0], texels[:, 1]
     return records
 
 
-def _unorm16x2(low: float, high: float) -> int:
+def _texels(scene: Scene) -> NDArray[np.float64]:
+    """Most texels that any texture lays on a unit of texture area, [material, coordinate set]."""
+    texels = np.zeros((len(scene.materials), 2))
+    for row, material in zip(texels, scene.materials, strict=True):
+        for slot in material.texture_slots().values():
+            height, width = scene.images[slot.image].pixels.shape[:2]
+            stretch = 1.0 if slot.uv_transform is None else np.linalg.det(slot.uv_transform[:2, :2])
+            row[slot.texcoord] = max(row[slot.texcoord], abs(stretch) * width * height)
+    return texels
+
+
+def _unorm16x2(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.uint32]:
     words = np.rint(np.clip([low, high], 0.0, 1.0) * 65535.0).astype(np.uint32)
-    return int(words[0] | words[1] << 16)
+    return np.asarray(words[0] | words[1] << 16)
 
 
-def _half2(low: float, high: float) -> int:
+def _half2(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.uint32]:
     largest = float(np.finfo(np.float16).max)
     words = np.clip([low, high], -largest, largest).astype(np.float16).view(np.uint16)
-    return int(words[0]) | int(words[1]) << 16
+    return np.asarray(words[0] | words[1].astype(np.uint32) << 16)

@@ -7,7 +7,7 @@ shapes, dtypes, finite values and index bounds, and raises SceneError naming mes
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NotRequired, TypedDict
 
@@ -120,8 +120,7 @@ class Material:
 
     def texture_slots(self) -> dict[str, TextureSlot]:
         """The slots that are in use, by field name."""
-        named = ((f.name, getattr(self, f.name)) for f in fields(self))
-        return {name: slot for name, slot in named if isinstance(slot, TextureSlot)}
+        return {name: value for name, value in vars(self).items() if isinstance(value, TextureSlot)}
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,8 +21,9 @@ def face_normals(positions: Vectors, triangles: Triangles) -> NDArray[np.float64
     if scale > 0.0:
         first /= scale
         second /= scale
-    normals: NDArray[np.float64] = np.cross(first, second)
-    return normals
+    # Not np.cross, whose overhead is most of the time for a mesh of few triangles.
+    (ux, uy, uz), (vx, vy, vz) = first.T, second.T
+    return np.stack((uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx), axis=1)
 
 
 def smooth_normals(positions: Vectors, triangles: Triangles) -> Vectors:
