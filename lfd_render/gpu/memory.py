@@ -89,7 +89,9 @@ class Ledger:
 class Buffer(Owned):
     """A storage buffer. Sizes are in bytes; contents travel as numpy arrays."""
 
-    def __init__(self, device: Device, label: str, size: int, data: bytes | None = None) -> None:
+    def __init__(
+        self, device: Device, label: str, size: int, data: NDArray[np.uint8] | None = None
+    ) -> None:
         limit = device.info.max_storage_bytes
         if size > limit:
             raise ResourceError(
@@ -100,7 +102,11 @@ class Buffer(Owned):
         self.size = max(4, size)
         try:
             context = device.context
-            self.glo = context.buffer(data) if data else context.buffer(reserve=self.size)
+            self.glo = (
+                context.buffer(data)
+                if data is not None and size
+                else context.buffer(reserve=self.size)
+            )
         except moderngl.Error as error:
             raise ResourceError(
                 f"device buffer '{label}': {size} bytes cannot be allocated on {device.name} "
@@ -112,12 +118,11 @@ class Buffer(Owned):
     @classmethod
     def of(cls, device: Device, label: str, array: NDArray[Any]) -> Buffer:
         """A buffer that holds a copy of an array."""
-        data = np.ascontiguousarray(array).tobytes()
-        return cls(device, label, len(data), data)
+        return cls(device, label, array.nbytes, _bytes(array))
 
     def write(self, array: NDArray[Any], offset: int = 0) -> None:
         """Copy an array into the buffer at a byte offset."""
-        self.glo.write(np.ascontiguousarray(array).tobytes(), offset=offset)
+        self.glo.write(_bytes(array), offset=offset)
 
     def read(self, dtype: DTypeLike, count: int = -1) -> NDArray[Any]:
         """The first `count` elements (all by default) as an array. Waits for the device."""
@@ -140,6 +145,11 @@ class Buffer(Owned):
     def _free(self) -> None:
         self._device.ledger.add(self.label, -self.size)
         self.glo.release()
+
+
+def _bytes(array: NDArray[Any]) -> NDArray[np.uint8]:
+    """An array's bytes in C order, without a copy where they lie so."""
+    return np.ascontiguousarray(array).reshape(-1).view(np.uint8)
 
 
 _BYTES_PER_TEXEL = {gl.RGBA8: 4, gl.SRGB8_ALPHA8: 4, gl.RGBA16F: 8}

@@ -142,7 +142,9 @@ class SceneBuffers:
         self.materials = Buffer.of(device, "materials", _material_records(scene))
         self.slots = Buffer.of(device, "materials", self.textures.slots)
         self.uv_transforms = Buffer.of(device, "materials", self.textures.uv_transforms)
-        self._extras = any(_needs_extras(mesh) for mesh in scene.meshes)
+        slots = [slot for m in scene.materials for slot in m.texture_slots().values()]
+        second_set = any(slot.texcoord == 1 for slot in slots)
+        self._extras = any(_needs_extras(mesh, second_set) for mesh in scene.meshes)
         self.batches: list[Batch] = []
         base = 0
         for alpha_mode in ALPHA_MODES:
@@ -235,8 +237,10 @@ def _cofactors(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
     return cofactors * np.where(determinant < 0.0, -1.0, 1.0)[:, None, None]
 
 
-def _needs_extras(mesh: Mesh) -> bool:
-    return bool(np.any(mesh.colors != 1.0) or np.any(mesh.texcoords[:, 1]))
+def _needs_extras(mesh: Mesh, second_set: bool) -> bool:
+    """Whether a mesh has colours, or a second coordinate set that some material reads."""
+    colored = mesh.colors.min(initial=1.0) < 1.0  # above 1 they are taken as 1
+    return bool(colored or (second_set and mesh.texcoords[:, 1].any()))
 
 
 def _shares_occlusion(material: Material) -> bool:

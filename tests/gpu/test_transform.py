@@ -1,5 +1,7 @@
 """Vertices and normals against the reference, and how a scene is cut into batches."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,9 +11,11 @@ from numpy.typing import NDArray
 from lfd_render.display import DisplayProfile, ViewGrid
 from lfd_render.gpu import scene_buffers
 from lfd_render.gpu.device import Device
+from lfd_render.gpu.layout import dtype
+from lfd_render.gpu.scene_buffers import SceneBuffers
 from lfd_render.reference import Triangles, placed
 from lfd_render.reference.transform import normals_by, points_by, unit
-from lfd_render.scene import Instance, Material, Mesh, Scene
+from lfd_render.scene import Image, Instance, Material, Mesh, Scene, TextureSlot
 
 from .helpers import (
     PAPER,
@@ -159,3 +163,18 @@ def test_a_mesh_larger_than_a_batch_is_cut(
     np.testing.assert_array_equal(p_display, expected.p_display)  # the identity is exact
     cosine = np.sum(normals * expected.normals_world, axis=-1)
     assert np.all(np.arccos(np.clip(cosine, -1, 1)) <= 2.0 * OCTAHEDRAL_RAD + 1e-7)
+
+
+@pytest.mark.parametrize("texcoord", [0, 1])
+def test_a_second_coordinate_set_takes_room_only_where_it_is_read(
+    device: Device, rng: np.random.Generator, texcoord: int
+) -> None:
+    corners = rng.uniform(-10.0, 10.0, (20, 3, 3))
+    mesh = mesh_of(corners, texcoords=rng.uniform(0.1, 1.0, (20, 3, 2, 2)))
+    image = Image("grey", np.full((2, 2, 4), 128, np.uint8))
+    material = Material("textured", base_color_texture=TextureSlot(0, texcoord=texcoord))
+    scene = dataclasses.replace(scene_of(mesh, materials=(material,)), images=(image,))
+    buffers = SceneBuffers(device, scene)
+    assert buffers.constants()["VERTEX_EXTRAS"] == texcoord
+    assert buffers.batches[0].extras.size == dtype("VertexExtra").itemsize * (60 if texcoord else 1)
+    buffers.release()
