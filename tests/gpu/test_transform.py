@@ -1,7 +1,5 @@
 """Vertices and normals against the reference, and how a scene is cut into batches."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -173,7 +171,8 @@ def test_a_second_coordinate_set_takes_room_only_where_it_is_read(
     mesh = mesh_of(corners, texcoords=rng.uniform(0.1, 1.0, (20, 3, 2, 2)))
     image = Image("grey", np.full((2, 2, 4), 128, np.uint8))
     material = Material("textured", base_color_texture=TextureSlot(0, texcoord=texcoord))
-    scene = dataclasses.replace(scene_of(mesh, materials=(material,)), images=(image,))
+    instance = Instance("textured", 0, np.eye(4))
+    scene = Scene("textured", (mesh,), (instance,), (material,), (image,))
     buffers = SceneBuffers(device, scene)
     assert buffers.constants()["VERTEX_EXTRAS"] == texcoord
     assert buffers.batches[0].extras.size == dtype("VertexExtra").itemsize * (60 if texcoord else 1)
