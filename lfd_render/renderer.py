@@ -18,19 +18,22 @@ from lfd_render.display.model import Spacing
 from lfd_render.errors import ResourceError, SceneError, UsageError
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
+from lfd_render.gpu.lighting import EnvironmentMap
 from lfd_render.gpu.scene_buffers import SceneBuffers
 from lfd_render.panel.eia import Eia
 from lfd_render.passes.encode import Encode
 from lfd_render.passes.placement import Placement
+from lfd_render.passes.prefilter import Prefilter
 from lfd_render.passes.view_target import ViewTarget
 from lfd_render.passes.weave import Weave
-from lfd_render.scene import Scene
+from lfd_render.scene import Environment, Scene
 from lfd_render.techniques import Lfdpr, Mvr, Technique
 
 REPEAT_TURN_RAD = np.deg2rad(0.5)  # how far the scene turns between repeated frames
 TECHNIQUES = ("lfdpr", "mvr")
 PRESETS = ("default", "paper")
 PROJECTIONS = ("shear", "general")
+ENVIRONMENTS = ("studio", "none")
 MOST_VIEWS = 1024
 MOST_RADIANCE = 65504.0  # what half floats hold
 MOST_VIEW_PIXELS = 1 << 32  # of all views together: hours on a processor, and far above any panel
@@ -40,7 +43,9 @@ MOST_VIEW_PIXELS = 1 << 32  # of all views together: hours on a processor, and f
 class RenderOptions:
     """How to render. view_size: upright views of (width, height); None: views that follow the
     lenses, with as many rows as makes all views together as large as the panel. projection: how
-    points reach the views, by the shear that parallel views share or by each view's own matrix."""
+    points reach the views, by the shear that parallel views share or by each view's own matrix.
+    environment: the built-in studio, none, or a picture, turned about the world's +y,
+    counter-clockwise seen from above, and scaled."""
 
     views: int | None = None
     view_size: tuple[int, int] | None = None
@@ -52,6 +57,9 @@ class RenderOptions:
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)
     exposure: float = 1.0
     projection: str = "shear"
+    environment: str | Environment = "studio"
+    environment_turn_rad: float = 0.0
+    environment_intensity: float = 1.0
 
     def __post_init__(self) -> None:
         """Check ranges; raises UsageError."""
@@ -77,6 +85,20 @@ class RenderOptions:
             raise UsageError(f"repeat: {self.repeat} is out of range; use 1 or more")
         if not 0.0 < self.exposure < np.inf:
             raise UsageError(f"exposure: {self.exposure} is out of range; use a positive number")
+        if not isinstance(self.environment, Environment) and self.environment not in ENVIRONMENTS:
+            raise UsageError(
+                f"environment {self.environment!r}: unknown; use {', '.join(ENVIRONMENTS)} or "
+                "an Environment"
+            )
+        if not np.isfinite(self.environment_turn_rad):
+            raise UsageError(
+                f"environment turn: {self.environment_turn_rad}; use a finite number of radians"
+            )
+        if not 0.0 <= self.environment_intensity <= MOST_RADIANCE:
+            raise UsageError(
+                f"environment intensity: {self.environment_intensity} is out of range; "
+                f"use a number from 0 to {MOST_RADIANCE:g}"
+            )
 
 
 @dataclass
@@ -117,6 +139,8 @@ class Renderer:
         self.device = Device.open(device) if isinstance(device, str) else device
         self._scene: Scene | None = None
         self._buffers: SceneBuffers | None = None
+        self._environment: Environment | None = None
+        self._environment_map: EnvironmentMap | None = None
 
     def __enter__(self) -> Renderer:
         return self
@@ -135,6 +159,7 @@ class Renderer:
             return
         self.device.activate()
         self._drop_scene()
+        self._drop_environment()
         if self._owns_device:
             self.device.close()
 
@@ -164,7 +189,7 @@ class Renderer:
         _check_size(grid, rig.views)
         _check_in_front(scene, camera, rig)
         timings = _Timings()
-        buffers = self._upload(scene, timings)
+        buffers = self._upload(scene, choice, timings)
 
         def compile_all() -> _PanelFrames:
             technique = self._technique(buffers, rig, grid, choice)
@@ -236,7 +261,7 @@ class Renderer:
         grid = ViewGrid.upright(display, width, height)
         _check_size(grid, rig.views)
         _check_in_front(scene, camera, rig)
-        buffers = self._upload(scene, _Timings())
+        buffers = self._upload(scene, choice, _Timings())
         technique = self._technique(buffers, rig, grid, choice)
         encode = Encode(self.device, grid.columns, technique.target.images.height)
         pictures = np.empty((rig.views, grid.rows, grid.columns, 3), np.uint8)
@@ -265,10 +290,12 @@ class Renderer:
             with self.device.undoing():
                 yield
         except BaseException:
-            self._drop_scene()  # it may be among what was undone
+            self._drop_scene()  # they may be among what was undone
+            self._drop_environment()
             raise
 
-    def _upload(self, scene: Scene, timings: _Timings) -> SceneBuffers:
+    def _upload(self, scene: Scene, choice: RenderOptions, timings: _Timings) -> SceneBuffers:
+        """The scene under its light; what is on the device already stays there."""
         if self._buffers is None or self._scene is not scene:
             self._drop_scene()
             self._buffers = timings.measure(
@@ -276,12 +303,37 @@ class Renderer:
             )
             self._scene = scene
         assert self._buffers is not None
+        environment = choice.environment
+        self._buffers.lighting.use(
+            self._prefiltered(environment, timings)
+            if isinstance(environment, Environment)
+            else environment,
+            turn_rad=choice.environment_turn_rad,
+            intensity=choice.environment_intensity,
+        )
         return self._buffers
+
+    def _prefiltered(self, environment: Environment, timings: _Timings) -> EnvironmentMap:
+        if self._environment_map is None or self._environment is not environment:
+            self._drop_environment()
+            prefilter = Prefilter(self.device)
+            self._environment_map = timings.measure(
+                "prefilter", self.device, lambda: prefilter(environment)
+            )
+            prefilter.release()
+            self._environment = environment
+        assert self._environment_map is not None
+        return self._environment_map
 
     def _drop_scene(self) -> None:
         if self._buffers is not None:
             self._buffers.release()
             self._buffers = self._scene = None
+
+    def _drop_environment(self) -> None:
+        if self._environment_map is not None:
+            self._environment_map.release()
+            self._environment_map = self._environment = None
 
     def _technique(
         self, buffers: SceneBuffers, rig: Rig, grid: ViewGrid, choice: RenderOptions

@@ -8,7 +8,7 @@ import typer
 
 from lfd_render.cli import options
 from lfd_render.cli.console import progress, say
-from lfd_render.cli.inputs import load_display, load_scene, place_camera
+from lfd_render.cli.inputs import load_display, load_light, load_scene, place_camera
 from lfd_render.cli.outputs import check_folder_output, make_folder
 
 if TYPE_CHECKING:
@@ -27,6 +27,10 @@ def demo(
     *,
     scene: Annotated[str, typer.Option(help="Scene to show.")] = SCENE,
     display: options.DisplayOption = options.DEFAULT_DISPLAY,
+    environment: options.EnvironmentOption = "studio",
+    environment_turn: options.EnvironmentTurnOption = 0.0,
+    environment_intensity: options.EnvironmentIntensityOption = 1.0,
+    exposure: options.ExposureOption = None,
     device: options.DeviceOption = "auto",
 ) -> None:
     """Render a scene and look at it from the left, the centre and the right."""
@@ -36,13 +40,20 @@ def demo(
     with progress("Loading"):
         loaded = load_scene(scene)
         window = place_camera(loaded, profile)
+        light = load_light(
+            loaded,
+            environment=environment,
+            turn_deg=environment_turn,
+            intensity=environment_intensity,
+            exposure=exposure,
+        )
 
     from lfd_render.panel.look import look  # noqa: PLC0415 (keeps --help quick)
     from lfd_render.panel.picture import write_png  # noqa: PLC0415
     from lfd_render.renderer import Renderer  # noqa: PLC0415
 
     with progress("Rendering"), Renderer(device=device) as renderer:
-        eia = renderer.render(loaded, profile, window)
+        eia = renderer.render(loaded, profile, window, **light)
     with progress("Looking"):
         seen = {eye: look(eia.pixels, profile, at * profile.cone_rad) for eye, at in EYES.items()}
 

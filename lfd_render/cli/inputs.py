@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from lfd_render.cli.console import warn
+from lfd_render.cli.options import parse_exposure
 from lfd_render.errors import SceneError, UsageError
 
 if TYPE_CHECKING:
@@ -35,6 +36,41 @@ def load_scene(source: str) -> Scene:
     for warning in scene.warnings:
         warn(f"{source}: {warning}")
     return scene
+
+
+def load_light(
+    scene: Scene,
+    *,
+    environment: str,
+    turn_deg: float,
+    intensity: float,
+    exposure: str | None,
+) -> dict[str, Any]:
+    """The renderer's options for light, as the command line names them.
+
+    Raises PictureError for an environment that cannot be read, UsageError for options out of range.
+    """
+    from lfd_render.scene import Environment  # noqa: PLC0415 (keeps --help quick)
+    from lfd_render.scene.exposure import exposure_hint  # noqa: PLC0415
+
+    if not math.isfinite(turn_deg):
+        raise UsageError(f"--environment-turn: {turn_deg}; give a finite number of degrees")
+    if not 0 <= intensity < math.inf:
+        raise UsageError(f"--environment-intensity: {intensity}; give a number from 0")
+    factor = parse_exposure(exposure)
+    if exposure is None and (hint := exposure_hint(scene)):
+        warn(hint)
+    chosen: str | Environment = environment
+    if environment not in ("studio", "none"):
+        chosen = Environment.load(environment)
+        for warning in chosen.warnings:
+            warn(warning)
+    return {
+        "environment": chosen,
+        "environment_turn_rad": math.radians(turn_deg),
+        "environment_intensity": intensity,
+        "exposure": factor,
+    }
 
 
 def place_camera(

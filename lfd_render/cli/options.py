@@ -10,6 +10,7 @@ from lfd_render.errors import UsageError
 
 DEFAULT_DISPLAY = "gavane-2024-tilted-4k"
 MAX_SEED = 2**32 - 1
+MAX_EXPOSURE_EV = 60
 
 
 class Technique(StrEnum):
@@ -49,6 +50,23 @@ def check_device(text: str) -> str:
     if text not in ("auto", "gpu", "software") and not re.fullmatch(r"\d{1,3}", text):
         raise UsageError(f"--device: '{text}'; give auto, gpu, software or an EGL index")
     return text
+
+
+def parse_exposure(text: str | None) -> float:
+    """The factor of ``0.5``, or of ``-1EV``: so many doublings. None is 1. Raises UsageError."""
+    if text is None:
+        return 1.0
+    match = re.fullmatch(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(ev)?", text.strip().lower())
+    if match:
+        number = float(match[1])
+        in_range = abs(number) <= MAX_EXPOSURE_EV if match[2] else number > 0
+        factor = 2.0**number if match[2] and in_range else number
+        if in_range and 2.0**-MAX_EXPOSURE_EV <= factor <= 2.0**MAX_EXPOSURE_EV:
+            return factor
+    raise UsageError(
+        f"--exposure: '{text}'; give a factor above 0, as 0.5, or stops, as -1.5EV, "
+        f"at most {MAX_EXPOSURE_EV} of them"
+    )
 
 
 SceneArgument = Annotated[
@@ -99,6 +117,27 @@ DepthScaleOption = Annotated[float, typer.Option(metavar="F", help="Scale depth 
 SpacingOption = Annotated[
     Spacing | None,
     typer.Option(help="Rule by which the eyes are spaced; else the display's."),
+]
+ExposureOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FACTOR|±EV",
+        help="What radiance is multiplied by: a factor, as 0.5, or stops, as -1.5EV.",
+    ),
+]
+EnvironmentOption = Annotated[
+    str,
+    typer.Option(
+        metavar="studio|none|FILE",
+        help="Light from all around: built in, none, or an equirectangular EXR, HDR, … picture.",
+    ),
+]
+EnvironmentTurnOption = Annotated[
+    float,
+    typer.Option(metavar="DEG", help="Turn the environment about +y, left seen from above."),
+]
+EnvironmentIntensityOption = Annotated[
+    float, typer.Option(metavar="F", help="Scale the environment's light.")
 ]
 SeedOption = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Seed of all random choices.")]
 DeviceOption = Annotated[

@@ -6,7 +6,7 @@ import typer
 
 from lfd_render.cli import options
 from lfd_render.cli.console import Stopwatch, print_json, progress, say, warn
-from lfd_render.cli.inputs import load_display, load_scene, place_camera
+from lfd_render.cli.inputs import load_display, load_light, load_scene, place_camera
 from lfd_render.cli.outputs import check_picture_output, write_picture
 
 
@@ -26,6 +26,10 @@ def render(
     yaw: options.YawOption = 0.0,
     depth_scale: options.DepthScaleOption = 1.0,
     spacing: options.SpacingOption = None,
+    environment: options.EnvironmentOption = "studio",
+    environment_turn: options.EnvironmentTurnOption = 0.0,
+    environment_intensity: options.EnvironmentIntensityOption = 1.0,
+    exposure: options.ExposureOption = None,
     seed: options.SeedOption = 0,
     repeat: Annotated[
         int, typer.Option(min=1, help="Render N frames with a moving camera; time their median.")
@@ -50,6 +54,13 @@ def render(
             yaw_deg=yaw,
             depth_scale=depth_scale,
         )
+        light = load_light(
+            loaded,
+            environment=environment,
+            turn_deg=environment_turn,
+            intensity=environment_intensity,
+            exposure=exposure,
+        )
 
     from lfd_render.renderer import Renderer  # noqa: PLC0415 (keeps --help quick)
 
@@ -65,6 +76,7 @@ def render(
             spacing=spacing.value if spacing else None,
             seed=seed,
             repeat=repeat,
+            **light,
         )
     with watch.span("encode"), progress("Writing"):
         write_picture(output, eia.save)

@@ -9,7 +9,7 @@ import typer
 
 from lfd_render.cli import options
 from lfd_render.cli.console import Stopwatch, print_json, progress, say
-from lfd_render.cli.inputs import load_display, load_scene, place_camera
+from lfd_render.cli.inputs import load_display, load_light, load_scene, place_camera
 from lfd_render.cli.outputs import check_folder_output, make_folder
 
 if TYPE_CHECKING:
@@ -39,6 +39,10 @@ def views(
     yaw: options.YawOption = 0.0,
     depth_scale: options.DepthScaleOption = 1.0,
     spacing: options.SpacingOption = None,
+    environment: options.EnvironmentOption = "studio",
+    environment_turn: options.EnvironmentTurnOption = 0.0,
+    environment_intensity: options.EnvironmentIntensityOption = 1.0,
+    exposure: options.ExposureOption = None,
     seed: options.SeedOption = 0,
     device: options.DeviceOption = "auto",
     json: options.JsonOption = False,
@@ -60,6 +64,13 @@ def views(
             yaw_deg=yaw,
             depth_scale=depth_scale,
         )
+        light = load_light(
+            loaded,
+            environment=environment,
+            turn_deg=environment_turn,
+            intensity=environment_intensity,
+            exposure=exposure,
+        )
 
     from lfd_render.renderer import Renderer  # noqa: PLC0415 (keeps --help quick)
 
@@ -74,6 +85,7 @@ def views(
             preset=preset.value,
             spacing=spacing.value if spacing else None,
             seed=seed,
+            **light,
         )
     with watch.span("encode"), progress("Writing"):
         make_folder(folder)

@@ -115,6 +115,20 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("uint", "triangle"),  # within its batch
         ("uint", "row_sides"),  # row, and DOUBLE_SIDED above it
     ),
+    # A light in world directions and units, told from the window's centre; also valid as std140.
+    "Light": (
+        ("vec4", "place"),  # of a directional light the unit direction to it, w = 0; else w = 1
+        ("vec4", "axis"),  # unit, which way it shines
+        ("vec4", "intensity"),  # lux or candela, red, green, blue
+        ("vec4", "fall"),  # of a cone: scale, offset of the cosine; 1/range
+    ),
+    # What the environment sends, its intensity included; also valid as std140.
+    "EnvironmentLight": (
+        ("mat4", "diffuse_red"),  # irradiance/π from (n, 1)ᵗ·M·(n, 1)
+        ("mat4", "diffuse_green"),
+        ("mat4", "diffuse_blue"),
+        ("vec4", "turn"),  # cosine, sine of the turn about +y; intensity; the last level's number
+    ),
     # Counts of the list of blocks to shade: the first three words dispatch.
     "BlockWork": (
         ("uint", "groups_x"),
@@ -131,6 +145,8 @@ CONSTANTS: dict[str, int] = {
     "NO_TRIANGLE": 0xFFFFFFFF,  # the word of a view pixel that shows the background
     "DOUBLE_SIDED": 1 << 16,
     "UNLIT": 1,  # flag of a material
+    "STUDIO": 1,  # kinds of environment
+    "PICTURE": 2,
     # A texture slot is one word: group, then layer, then coordinate set.
     "SLOT_GROUP_BITS": 8,
     "SLOT_LAYER_BITS": 16,

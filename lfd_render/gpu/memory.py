@@ -152,11 +152,13 @@ def _bytes(array: NDArray[Any]) -> NDArray[np.uint8]:
     return np.ascontiguousarray(array).reshape(-1).view(np.uint8)
 
 
-_BYTES_PER_TEXEL = {gl.RGBA8: 4, gl.SRGB8_ALPHA8: 4, gl.RGBA16F: 8}
+_BYTES_PER_TEXEL = {gl.RGBA8: 4, gl.SRGB8_ALPHA8: 4, gl.RGBA16F: 8, gl.RGBA32F: 16}
 
 
 class TextureArray(Owned):
     """A 2D array texture with immutable storage: [layer, y, x], row 0 as uploaded."""
+
+    _target = gl.TEXTURE_2D_ARRAY
 
     def __init__(
         self,
@@ -181,24 +183,32 @@ class TextureArray(Owned):
         self.internal_format = internal_format
         super().__init__(device)
         name = ctypes.c_uint()
-        device.raw.glCreateTextures(gl.TEXTURE_2D_ARRAY, 1, ctypes.byref(name))
+        device.raw.glCreateTextures(self._target, 1, ctypes.byref(name))
         self.name = int(name.value)
         self.size = sum(
             max(1, width >> level) * max(1, height >> level) for level in range(levels)
         ) * (layers * _BYTES_PER_TEXEL[internal_format])
         device.ledger.add(label, self.size)
-        device.raw.glTextureStorage3D(self.name, levels, internal_format, width, height, layers)
+        self._make_room()
         device.check()
 
-    def upload(self, layer: int, pixels: NDArray[np.uint8], top: int = 0) -> None:
-        """Set rows of level 0 of a layer, from row `top` on, from uint8 [y, x, 4]."""
+    def _make_room(self) -> None:
+        self._device.raw.glTextureStorage3D(
+            self.name, self.levels, self.internal_format, self.width, self.height, self.layers
+        )
+
+    def upload(
+        self, layer: int, pixels: NDArray[np.uint8] | NDArray[np.float32], top: int = 0
+    ) -> None:
+        """Set rows of level 0 of a layer, from row `top` on, from uint8 or float32 [y, x, 4]."""
         rows = len(pixels)
         assert pixels.shape == (rows, self.width, 4)
         assert top + rows <= self.height
         data = np.ascontiguousarray(pixels)
+        kind = gl.UNSIGNED_BYTE if data.dtype == np.uint8 else gl.FLOAT
         self._device.raw.glTextureSubImage3D(
             self.name, 0, 0, top, layer, self.width, rows, 1,
-            gl.RGBA, gl.UNSIGNED_BYTE, data.ctypes.data,
+            gl.RGBA, kind, data.ctypes.data,
         )  # fmt: skip
 
     def copy_level(self, source: TextureArray, level: int, layer: int, top: int) -> None:
@@ -232,22 +242,43 @@ class TextureArray(Owned):
         """Make the texture what samplers of this unit read."""
         self._device.raw.glBindTextureUnit(unit, self.name)
 
-    def bind_image(self, unit: int, *, writeonly: bool = True) -> None:
-        """Make all layers what image stores, and loads unless writeonly, of this unit reach."""
+    def bind_image(self, unit: int, *, writeonly: bool = True, level: int = 0) -> None:
+        """Make a level what image stores, and loads unless writeonly, of this unit reach."""
         access = gl.WRITE_ONLY if writeonly else gl.READ_WRITE
-        self._device.raw.glBindImageTexture(unit, self.name, 0, 1, 0, access, self.internal_format)
+        raw = self._device.raw
+        raw.glBindImageTexture(unit, self.name, level, 1, 0, access, self.internal_format)
 
-    def read(self, dtype: DTypeLike, gl_type: int) -> NDArray[Any]:
-        """Level 0 as [layer, y, x, 4]. Waits for the device."""
-        pixels = np.empty((self.layers, self.height, self.width, 4), dtype)
+    def read(self, dtype: DTypeLike, gl_type: int, level: int = 0) -> NDArray[Any]:
+        """A level as [layer, y, x, 4]. Waits for the device."""
+        size = (max(1, self.height >> level), max(1, self.width >> level))
+        pixels = np.empty((self.layers, *size, 4), dtype)
         self._device.raw.glGetTextureImage(
-            self.name, 0, gl.RGBA, gl_type, pixels.nbytes, pixels.ctypes.data
+            self.name, level, gl.RGBA, gl_type, pixels.nbytes, pixels.ctypes.data
         )
         return pixels
 
     def _free(self) -> None:
         self._device.ledger.add(self.label, -self.size)
         self._device.raw.glDeleteTextures(1, ctypes.byref(ctypes.c_uint(self.name)))
+
+
+class CubeMap(TextureArray):
+    """Six square faces around a point, in OpenGL's order, filtered across their edges."""
+
+    _target = gl.TEXTURE_CUBE_MAP
+
+    def __init__(
+        self, device: Device, label: str, size: int, internal_format: int, *, levels: int = 1
+    ) -> None:
+        """size: texels along an edge of a face."""
+        super().__init__(device, label, (size, size, 6), internal_format, levels=levels)
+        device.raw.glEnable(gl.TEXTURE_CUBE_MAP_SEAMLESS)
+        self.parameters(gl.LINEAR_MIPMAP_LINEAR, gl.LINEAR, ("clamp", "clamp"))
+
+    def _make_room(self) -> None:
+        self._device.raw.glTextureStorage2D(
+            self.name, self.levels, self.internal_format, self.width, self.height
+        )
 
 
 class TableTexture(Owned):

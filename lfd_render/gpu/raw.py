@@ -6,6 +6,8 @@ from typing import Any
 # moderngl 5.13 has no internal format for arrays and no layered depth; these calls fill the gap.
 TEXTURE_2D = 0x0DE1
 TEXTURE_2D_ARRAY = 0x8C1A
+TEXTURE_CUBE_MAP = 0x8513
+TEXTURE_CUBE_MAP_SEAMLESS = 0x884F
 RGBA32UI = 0x8D70
 R32UI = 0x8236
 RED_INTEGER = 0x8D94
@@ -14,6 +16,7 @@ UNSIGNED_INT = 0x1405
 SRGB8_ALPHA8 = 0x8C43
 RGBA8 = 0x8058
 RGBA16F = 0x881A
+RGBA32F = 0x8814
 RGBA = 0x1908
 UNSIGNED_BYTE = 0x1401
 TEXTURE_MIN_FILTER = 0x2801

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.gpu.layout import CONSTANTS, TEXTURE_ROLES, dtype
+from lfd_render.gpu.lighting import Lighting
 from lfd_render.gpu.memory import Buffer, TextureArray
 from lfd_render.gpu.textures import MaterialTextures
 from lfd_render.scene import Material, Mesh, Scene
@@ -127,6 +128,7 @@ class SceneBuffers:
     def __init__(self, device: Device, scene: Scene) -> None:
         self.scene = scene
         self.textures = MaterialTextures(device, scene.materials, scene.images)
+        self.lighting = Lighting(device, scene.lights)
         self.warnings = [*scene.warnings, *self.textures.warnings]
         self._world_from_local = np.stack([i.world_from_local for i in scene.instances])
         normal = _cofactors(self._world_from_local[:, :3, :3])
@@ -166,6 +168,7 @@ class SceneBuffers:
             self._double_sided, CONSTANTS["FACING_BOTH"], 0
         )
         self.draws.write(self._records)
+        self.lighting.place(np.linalg.inv(display_from_world)[:3, 3].astype(np.float64))
 
     def runs(self, batch: Batch) -> list[DrawRun]:
         """The batch's triangles in runs of equal raster state."""
@@ -223,6 +226,7 @@ class SceneBuffers:
         for buffer in (self.draws, self.materials, self.slots, self.uv_transforms):
             buffer.release()
         self.textures.release()
+        self.lighting.release()
 
 
 def _cofactors(matrices: NDArray[np.float64]) -> NDArray[np.float64]:

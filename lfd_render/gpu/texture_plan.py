@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lfd_render.errors import ResourceError
 from lfd_render.gpu.device import DeviceInfo
 
-RESERVED_UNITS = 2  # view images and the panel image
+RESERVED_UNITS = 3  # view images, the panel image and the environment
 _MOST_KINDS = 256  # that are merged pair by pair; more are first brought to steps of sizes
 _GIB = 1 << 30
 

@@ -16,7 +16,7 @@ from lfd_render.gpu.framebuffer import (
     rasterising,
 )
 from lfd_render.gpu.memory import Buffer
-from lfd_render.gpu.programs import RasterProgram, Uniform
+from lfd_render.gpu.programs import RasterProgram, Samplers, Uniform
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.placement import Placement, gl_matrix
 from lfd_render.passes.view_target import Band, ViewTarget
@@ -45,6 +45,7 @@ class RasterForward:
                     "ALPHA_TESTED": int(alpha_mode != "opaque"),
                     "BLENDED": int(alpha_mode == "blend"),
                     **scene.constants(),
+                    **scene.lighting.constants(),
                 },
             )
             for alpha_mode in sorted({batch.alpha_mode for batch in scene.batches})
@@ -98,8 +99,10 @@ class RasterForward:
             "WorldNormals": batch.world_normals,
             "FrameBlock": band.frame(batch),
             **self._scene.materials_of(),
+            **self._scene.lighting.buffers(),
         }
-        self._programs[batch.alpha_mode].set(buffers, camera, self._scene.samplers())
+        samplers: Samplers = {**self._scene.samplers(), **self._scene.lighting.samplers()}
+        self._programs[batch.alpha_mode].set(buffers, camera, samplers)
         for run in self._scene.runs(batch):
             face_culling(self._device, double_sided=run.double_sided, mirrored=run.mirrored)
             draws.draw(run.first, run.count)

@@ -34,6 +34,7 @@ class Shade:
             "WORD_STRIDE": word_stride,
             "GROUPS_ACROSS": GROUPS_ACROSS,
             **scene.constants(),
+            **scene.lighting.constants(),
         }
         self._scene = scene
         self._list = Kernel(device, "shade/blocks.comp", constants)
@@ -86,12 +87,13 @@ class Shade:
                     **batch.attributes(),
                     "WorldNormals": batch.world_normals,
                     **self._scene.materials_of(),
+                    **self._scene.lighting.buffers(),
                     "Draws": self._scene.draws,
                     "Eyes": band.target.eyes,
                     "RowOffsets": band.target.row_offsets,
                 },
                 {"world_from_display": world_from_display, "row_blocks": self._row_blocks},
-                self._scene.samplers(),
+                {**self._scene.samplers(), **self._scene.lighting.samplers()},
             )
             kernel.run_indirect(self._work)
 

@@ -1,12 +1,14 @@
 """The colour of a view pixel: where its ray meets the triangle, glTF metallic-roughness there.
 
-glTF 2.0 specification, appendix B (BRDF implementation), under the studio's light. Derivatives are
+glTF 2.0 specification, appendix B (BRDF implementation), under an environment, by default the
+studio, and the scene's lights; the studio's key light shines only without any. Derivatives are
 those of the barycentric weights: with α, β, γ linear in the window point (see `raster`), the weight
 of a corner is α/(α + β + γ), and its derivative follows by the quotient rule.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,6 +17,8 @@ from numpy.typing import NDArray
 
 from lfd_render.display import Rig, ViewGrid
 from lfd_render.reference import studio
+from lfd_render.reference.environment import Environment
+from lfd_render.reference.lights import Arrival, arriving
 from lfd_render.reference.raster import Accepts, Pixels, faces, meet, rays
 from lfd_render.reference.textures import area_lod, mip_chain, sampled
 from lfd_render.reference.transform import Triangles, points_by, unit
@@ -69,10 +73,17 @@ def points_at(triangles: Triangles, rig: Rig, grid: ViewGrid, ids: Int, pixels: 
 class Shading:
     """Materials of a scene, ready to colour points. Mip chains are made once an image."""
 
-    def __init__(self, scene: Scene, triangles: Triangles, world_from_display: Float64) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        triangles: Triangles,
+        world_from_display: Float64,
+        environment: Environment = studio,
+    ) -> None:
         self.scene = scene
         self.triangles = triangles
         self.world_from_display = world_from_display
+        self.environment = environment
         self._chains: dict[tuple[int, bool], list[Float64]] = {}
 
     def colors(self, points: Points, eyes_mm: Float64, distance_mm: float) -> Float64:
@@ -187,7 +198,7 @@ class Surface:
 
     @cached_property
     def occlusion(self) -> Float64:
-        """Share of the studio's light that arrives, [pixel]: the map's red by the strength."""
+        """Share of the environment's light that arrives, [pixel]: the map's red by the strength."""
         slot, texels = self._material.occlusion_texture, self.texture("occlusion_texture")
         if slot is None or texels is None:
             return np.ones(len(self._points.ids))
@@ -220,24 +231,40 @@ class Surface:
         f0 = 0.04 + (base_color - 0.04) * metallic[:, None]
         albedo = base_color * (1.0 - metallic)[:, None]
         light = self.occlusion[:, None] * (
-            albedo * studio.diffuse(self.normal) + self._mirrored(f0, roughness, toward_eye)
+            albedo * self._shading.environment.diffuse(self.normal)
+            + self._mirrored(f0, roughness, toward_eye)
         )
-        return light + self._key_light(f0, albedo, roughness, toward_eye) + self.emitted
+        for arrival in self._arrivals(p_world):
+            light += self._lit(arrival, f0, albedo, roughness, toward_eye)
+        return light + self.emitted
+
+    def _arrivals(self, p_world: Float64) -> Sequence[Arrival]:
+        """Light that comes from single directions."""
+        lights = self._shading.scene.lights
+        if lights:
+            return [arriving(light, p_world) for light in lights]
+        return self._shading.environment.key()
 
     def _mirrored(self, f0: Float64, roughness: Float64, toward_eye: Float64) -> Float64:
-        """The studio seen in the surface: its blurred light by the environment BRDF."""
+        """The environment seen in the surface: its blurred light by the environment BRDF."""
         normal = self.normal
         n_dot_v = _eye_cosine(normal, toward_eye)
         reflected = 2.0 * _dot(normal, toward_eye)[:, None] * normal - toward_eye
         scale, bias = environment_brdf(roughness, n_dot_v)
-        return (f0 * scale[:, None] + bias[:, None]) * studio.radiance(reflected, roughness)
+        light = self._shading.environment.radiance(reflected, roughness)
+        return (f0 * scale[:, None] + bias[:, None]) * light
 
-    def _key_light(
-        self, f0: Float64, albedo: Float64, roughness: Float64, toward_eye: Float64
+    def _lit(
+        self,
+        arrival: Arrival,
+        f0: Float64,
+        albedo: Float64,
+        roughness: Float64,
+        toward_eye: Float64,
     ) -> Float64:
-        """Light of the key, diffuse (albedo/π) and specular."""
-        n_dot_l = np.maximum(0.0, self.normal @ studio.KEY_DIRECTION)
-        halfway = unit(toward_eye + studio.KEY_DIRECTION)
+        """Light from one direction sent on, diffuse (albedo/π) and specular."""
+        n_dot_l = np.maximum(0.0, _dot(self.normal, arrival.directions))
+        halfway = unit(toward_eye + arrival.directions)
         specular = specular_brdf(
             f0,
             np.maximum(SMALLEST_ALPHA, roughness**2),
@@ -246,7 +273,7 @@ class Surface:
             n_dot_h=np.clip(_dot(self.normal, halfway), 0.0, 1.0),
             v_dot_h=np.clip(_dot(toward_eye, halfway), 0.0, 1.0),
         )
-        lit: Float64 = studio.KEY_IRRADIANCE * n_dot_l[:, None] * (albedo / np.pi + specular)
+        lit: Float64 = arrival.irradiance * n_dot_l[:, None] * (albedo / np.pi + specular)
         return lit
 
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lfd_render.reference.lights import Arrival
+
 Float64 = NDArray[np.float64]
 
 CEILING = np.array([0.62, 0.66, 0.74])  # radiance from straight above
@@ -55,6 +57,11 @@ def diffuse(normals: Float64) -> Float64:
         cosine = np.maximum(0.0, normals @ to_box)
         light += (2.0 * np.pi / sharpness * cosine / np.pi)[:, None] * middle
     return light
+
+
+def key() -> list[Arrival]:
+    """The key light, which shines in scenes without lights of their own."""
+    return [Arrival(KEY_DIRECTION, KEY_IRRADIANCE)]
 
 
 def gradient(up: Float64, width: Float64) -> Float64:

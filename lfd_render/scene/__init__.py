@@ -1,9 +1,11 @@
 """Scenes: glTF and OBJ files, procedural built-ins, and the frozen data they become."""
 
+from lfd_render.scene.environment import Environment
 from lfd_render.scene.limits import LoadLimits
 from lfd_render.scene.model import (
     Image,
     Instance,
+    Light,
     Material,
     Mesh,
     Scene,
@@ -13,8 +15,10 @@ from lfd_render.scene.model import (
 )
 
 __all__ = [
+    "Environment",
     "Image",
     "Instance",
+    "Light",
     "LoadLimits",
     "Material",
     "Mesh",

@@ -14,6 +14,7 @@ from lfd_render.errors import ResourceError
 from lfd_render.scene.files import SceneFiles
 from lfd_render.scene.gltf_accessors import Accessors
 from lfd_render.scene.gltf_document import Document
+from lfd_render.scene.gltf_lights import read_lights
 from lfd_render.scene.gltf_materials import Materials
 from lfd_render.scene.gltf_meshes import Meshes
 from lfd_render.scene.gltf_nodes import NodeTree
@@ -41,6 +42,7 @@ def load_gltf(path: Path, limits: LoadLimits) -> Scene:
         materials=materials.materials(),
         images=materials.decode() if instances else (),
         cameras=tree.cameras(),
+        lights=read_lights(document, tree),
         warnings=document.warnings,
     )
 

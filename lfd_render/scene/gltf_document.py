@@ -21,6 +21,7 @@ _CHUNK_JSON, _CHUNK_BIN = 0x4E4F534A, 0x004E4942
 EXTENSIONS = frozenset(
     {
         "EXT_texture_webp",
+        "KHR_lights_punctual",
         "KHR_materials_emissive_strength",
         "KHR_materials_unlit",
         "KHR_mesh_quantization",

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from lfd_render.errors import ResourceError
 
 MAX_IMAGE_SIDE = 16384
+MOST_LIGHTS = 256  # what the smallest uniform block that OpenGL promises holds
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class LoadLimits:
     mesh_bytes: int = 8 << 30  # vertex and index bytes of all meshes
     nodes: int = 1 << 20  # nodes, and instances of meshes
     drawn_triangles: int = 1 << 28  # triangles counted over instances
+    lights: int = MOST_LIGHTS  # lights of nodes that are drawn
 
 
 class Budget:

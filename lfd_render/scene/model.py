@@ -15,12 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.errors import SceneError
-from lfd_render.scene.limits import LoadLimits
+from lfd_render.scene.limits import MOST_LIGHTS, LoadLimits
 
 Wrap = Literal["repeat", "clamp", "mirror"]
 AlphaMode = Literal["opaque", "mask", "blend"]
 WRAPS: tuple[Wrap, ...] = ("repeat", "clamp", "mirror")
 ALPHA_MODES: tuple[AlphaMode, ...] = ("opaque", "mask", "blend")
+LightKind = Literal["directional", "point", "spot"]
+LIGHT_KINDS: tuple[LightKind, ...] = ("directional", "point", "spot")
 
 _BOUNDS_CHUNK = 1 << 18  # vertices transformed at once: 6 MB of float64
 
@@ -187,8 +189,49 @@ class SceneCamera:
 
 
 @dataclass(frozen=True, eq=False)
+class Light:
+    """A light without size (KHR_lights_punctual), which shines along its own −z.
+
+    `intensity` is in lux (directional) or candela (point, spot), `color` linear; `range` is in
+    world units, None without end. Spots fade from `inner_cone_rad` to `outer_cone_rad`, measured
+    from their axis. Of the matrix only where it stands and turns to counts, not its scale.
+    """
+
+    name: str
+    kind: LightKind
+    world_from_light: NDArray[np.float64]
+    color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    intensity: float = 1.0
+    range: float | None = None
+    inner_cone_rad: float = 0.0
+    outer_cone_rad: float = np.pi / 4
+
+    def __post_init__(self) -> None:
+        """Check the matrix and ranges."""
+        label = f"light '{self.name}'"
+        if self.kind not in LIGHT_KINDS:
+            raise SceneError(f"{label}: kind: {self.kind!r}; give one of {', '.join(LIGHT_KINDS)}")
+        _check_affine(self, label, "world_from_light")
+        if self.kind != "point" and not np.any(self.world_from_light[:3, 2]):
+            raise SceneError(f"{label}: world_from_light: its −z has no length; scale it up")
+        powers = (*self.color, self.intensity)
+        if len(self.color) != 3 or not all(0.0 <= p < np.inf for p in powers):
+            raise SceneError(
+                f"{label}: color {self.color}, intensity {self.intensity}; "
+                "give finite numbers from 0"
+            )
+        if self.range is not None and not 0.0 < self.range < np.inf:
+            raise SceneError(f"{label}: range: {self.range}; give a number above 0, or None")
+        if not 0.0 <= self.inner_cone_rad < self.outer_cone_rad <= np.pi / 2:
+            raise SceneError(
+                f"{label}: cones {self.inner_cone_rad}, {self.outer_cone_rad}; give angles "
+                "0 ≤ inner < outer ≤ π/2"
+            )
+
+
+@dataclass(frozen=True, eq=False)
 class Scene:
-    """Meshes, where they stand, and what they are made of."""
+    """Meshes, where they stand, what they are made of, and lights of their own, if any."""
 
     name: str
     meshes: tuple[Mesh, ...]
@@ -198,6 +241,7 @@ class Scene:
     cameras: tuple[SceneCamera, ...] = ()
     default_camera: WindowCamera | None = None
     warnings: tuple[str, ...] = ()
+    lights: tuple[Light, ...] = ()
 
     def __post_init__(self) -> None:
         """Check every index and that something can be drawn."""
@@ -220,6 +264,8 @@ class Scene:
                         f"material '{material.name}': {field}: image {slot.image}; "
                         f"the scene has {len(self.images)}"
                     )
+        if len(self.lights) > MOST_LIGHTS:
+            raise SceneError(f"lights: {len(self.lights)}; give at most {MOST_LIGHTS}")
         if self.triangle_count == 0:
             raise SceneError("meshes: 0 triangles; give a scene with at least one triangle")
 

@@ -1,7 +1,8 @@
-// glTF 2.0 metallic-roughness (specification, appendix B) under the studio. One function serves every
-// technique; it returns scene-linear radiance.
+// glTF 2.0 metallic-roughness (specification, appendix B) under the environment and the scene's lights.
+// One function serves every technique; it returns scene-linear radiance.
 
 #include "common/environment.glsl"
+#include "common/lights.glsl"
 #include "common/textures.glsl"
 
 const float PI = 3.14159265359;
@@ -10,6 +11,7 @@ const float SMALLEST_ALPHA = 0.002;  // keeps the specular peak of a mirror fini
 
 struct Surface {
     vec3 to_eye;       // world, any length; not two positions, which lose precision far from 0
+    vec3 place;        // world directions and units, from the window's centre
     vec3 normal;       // interpolated, world, any length
     vec3 dp_dx;        // change of world position over a column and a row
     vec3 dp_dy;
@@ -89,6 +91,20 @@ vec3 emitted(Surface surface) {
     return radiance;
 }
 
+// A point of a surface as light meets it.
+struct Facet {
+    vec3 normal, view;  // unit
+    vec3 f0, albedo;
+    float alpha, n_dot_v;
+};
+
+// Diffuse and specular reflectance of light from a unit direction.
+vec3 reflectance(Facet facet, vec3 to_light, float n_dot_l) {
+    vec3 halfway = normalize(facet.view + to_light);
+    float n_dot_h = clamp(dot(facet.normal, halfway), 0.0, 1.0), v_dot_h = clamp(dot(facet.view, halfway), 0.0, 1.0);
+    return facet.albedo / PI + specular_brdf(facet.f0, facet.alpha, n_dot_l, facet.n_dot_v, n_dot_h, v_dot_h);
+}
+
 // Radiance towards the eye and opacity.
 vec4 shade(Surface surface) {
     vec4 base_color_alpha = base_color_of(surface);
@@ -102,21 +118,26 @@ vec4 shade(Surface surface) {
     if (slot != NO_TEXTURE) normal = mapped_normal(normal, surface, slot);
     if (surface.back) normal = -normal;
 
-    vec3 view = normalize(surface.to_eye);
-    float n_dot_v = clamp(abs(dot(normal, view)), 1e-4, 1.0);
-    vec3 f0 = mix(vec3(0.04), base_color, metallic);
-    vec3 albedo = base_color * (1.0 - metallic);
-    float alpha = max(SMALLEST_ALPHA, roughness * roughness);
+    Facet facet;
+    facet.normal = normal;
+    facet.view = normalize(surface.to_eye);
+    facet.n_dot_v = clamp(abs(dot(normal, facet.view)), 1e-4, 1.0);
+    facet.f0 = mix(vec3(0.04), base_color, metallic);
+    facet.albedo = base_color * (1.0 - metallic);
+    facet.alpha = max(SMALLEST_ALPHA, roughness * roughness);
 
-    vec2 brdf = environment_brdf(roughness, n_dot_v);
-    vec3 radiance = orm.r * (albedo * environment_diffuse(normal)
-        + (f0 * brdf.x + brdf.y) * environment_radiance(reflect(-view, normal), roughness));
-
-    float n_dot_l = dot(normal, KEY_DIRECTION);
-    if (n_dot_l > 0.0) {
-        vec3 halfway = normalize(view + KEY_DIRECTION);
-        vec3 specular = specular_brdf(f0, alpha, n_dot_l, n_dot_v, clamp(dot(normal, halfway), 0.0, 1.0), clamp(dot(view, halfway), 0.0, 1.0));
-        radiance += KEY_IRRADIANCE * n_dot_l * (albedo / PI + specular);
+    vec2 brdf = environment_brdf(roughness, facet.n_dot_v);
+    vec3 radiance = orm.r * (facet.albedo * environment_diffuse(normal)
+        + (facet.f0 * brdf.x + brdf.y) * environment_radiance(reflect(-facet.view, normal), roughness));
+    if (LIGHTS == 0 && ENVIRONMENT == STUDIO) {
+        vec3 to_key = turned(KEY_DIRECTION, environment.turn.y);
+        float n_dot_l = dot(normal, to_key);
+        if (n_dot_l > 0.0) radiance += scaled(KEY_IRRADIANCE * n_dot_l * reflectance(facet, to_key, n_dot_l));
+    }
+    for (int i = 0; i < LIGHTS; i++) {
+        Arrival light = light_arriving(i, surface.place);
+        float n_dot_l = dot(normal, light.direction);
+        if (n_dot_l > 0.0) radiance += light.irradiance * n_dot_l * reflectance(facet, light.direction, n_dot_l);
     }
     return vec4(min(radiance + emitted(surface), MOST_RADIANCE), base_color_alpha.a);
 }

@@ -19,6 +19,7 @@ void main() {
     Surface surface;
     mat3 turn = mat3(world_from_display);
     surface.to_eye = turn * (vec3(eye_mm, 0.0, frame.distance_mm) - p_display);
+    surface.place = turn * p_display;
     surface.normal = normal_world;
     surface.dp_dx = turn * dFdx(p_display);
     surface.dp_dy = turn * dFdy(p_display);

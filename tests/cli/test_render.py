@@ -44,6 +44,10 @@ def test_options_reach_the_renderer(
         "spacing": "angle",
         "seed": 9,
         "repeat": 3,
+        "environment": "studio",
+        "environment_turn_rad": 0.0,
+        "environment_intensity": 1.0,
+        "exposure": 1.0,
     }
 
 

@@ -14,9 +14,11 @@ from lfd_render.display import Camera, DisplayProfile, Rig, ViewGrid
 from lfd_render.gpu import raw as gl
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.layout import dtype
+from lfd_render.gpu.lighting import EnvironmentMap
 from lfd_render.gpu.memory import TextureArray
 from lfd_render.gpu.scene_buffers import SceneBuffers
 from lfd_render.passes.placement import Placement
+from lfd_render.passes.prefilter import Prefilter
 from lfd_render.passes.sample import Sample
 from lfd_render.passes.shade import Shade
 from lfd_render.passes.splat import Splat, view_lanes
@@ -24,7 +26,7 @@ from lfd_render.passes.transform import Transform
 from lfd_render.passes.view_buffers import INT64_ATOMICS, make_view_buffers
 from lfd_render.passes.view_target import Band, ViewTarget
 from lfd_render.reference import Triangles, placed
-from lfd_render.scene import Image, Instance, Material, Mesh, Scene, TextureSlot
+from lfd_render.scene import Environment, Image, Instance, Material, Mesh, Scene, TextureSlot
 
 FULL = os.environ.get("LFD_FULL") == "1"
 PAPER = "gavane-2024-tilted-4k"
@@ -244,11 +246,18 @@ class Passes:
         stochastic_culling: bool = False,
         background: tuple[float, float, float] = (0.0, 0.0, 0.0),
         seed: int = 0,
+        environment: str | Environment = "studio",
+        turn_rad: float = 0.0,
+        intensity: float = 1.0,
     ) -> None:
         self.scene, self.rig, self.grid = scene, rig, grid
         self.display_from_world = np.eye(4) if display_from_world is None else display_from_world
         self.placement = Placement(self.display_from_world, background)
         self.buffers = SceneBuffers(device, scene)
+        self.map = (
+            prefiltered(device, environment) if isinstance(environment, Environment) else None
+        )
+        self.buffers.lighting.use(self.map or environment, turn_rad=turn_rad, intensity=intensity)
         self.target = ViewTarget(device, rig, grid, self.buffers.batches, seed)
         self.transform = Transform(device)
         self.sample = Sample(
@@ -368,6 +377,16 @@ class Passes:
             self.target, self.buffers,
         ):  # fmt: skip
             owner.release()
+        if self.map:
+            self.map.release()
+
+
+def prefiltered(device: Device, environment: Environment) -> EnvironmentMap:
+    """An environment's map, whose release is the caller's."""
+    prefilter = Prefilter(device)
+    found = prefilter(environment)
+    prefilter.release()
+    return found
 
 
 @contextmanager

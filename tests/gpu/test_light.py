@@ -1,0 +1,490 @@
+"""Lights and environments on the device, against the reference and against plain answers."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from lfd_render.display import Camera, DisplayProfile, Rig, ViewGrid
+from lfd_render.gpu import raw as gl
+from lfd_render.gpu.device import Device
+from lfd_render.reference import Visibility, studio
+from lfd_render.reference.environment import Adjusted, Darkness, Panorama
+from lfd_render.reference.environment import Environment as ReferenceEnvironment
+from lfd_render.reference.pipeline import shade_over
+from lfd_render.reference.shade import Shading
+from lfd_render.renderer import Renderer
+from lfd_render.scene import Environment, Instance, Light, Material, Mesh, Scene
+
+from .helpers import PAPER, examples, mesh_of, passes, prefiltered
+
+pytestmark = pytest.mark.needs("gl")
+
+Float64 = NDArray[np.float64]
+seeds = st.integers(0, 2**32 - 1)
+HALF = 2.0**-10  # a step of half floats, relative: llvmpipe cuts, others round
+
+
+def views(columns: int = 48, rows: int = 27, count: int = 2) -> tuple[Rig, ViewGrid]:
+    profile = DisplayProfile.load(PAPER)
+    return profile.rig(count), ViewGrid.upright(profile, columns, rows)
+
+
+def wall(material: Material, lights: tuple[Light, ...] = (), bend: float = 0.5) -> Scene:
+    """A square over most of the window whose normals lean outward at its corners."""
+    corners = np.array([[-70.0, -60, 0], [70, -60, 0], [70, 60, 0], [-70, 60, 0]])
+    normals = np.concatenate([bend * corners[:, :2] / 70.0, np.ones((4, 1))], axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    order = np.array([[0, 1, 2], [0, 2, 3]])
+    mesh = mesh_of(corners[order], normals=normals[order])
+    return Scene("wall", (mesh,), (Instance("wall", 0, np.eye(4)),), (material,), lights=lights)
+
+
+def difference(
+    device: Device,
+    scene: Scene,
+    reference: ReferenceEnvironment = studio,
+    camera: Float64 | None = None,
+    **light: object,
+) -> tuple[Float64, Float64]:
+    """Images of the device and of the reference at what the device found visible, where anything
+    is: [pixel, rgb] each."""
+    rig, grid = views()
+    with passes(device, scene, rig, grid, camera, **light) as opened:
+        found, triangles, images = opened.winners(), opened.triangles(), opened.images()
+        world_from_display = np.linalg.inv(opened.display_from_world)
+    expected = np.zeros(images.shape)
+    shading = Shading(scene, triangles, world_from_display, reference)
+    solid = Visibility(found.solid, found.solid_depths.astype(np.float64))
+    shade_over(expected, shading, solid, rig, grid)
+    shown = (found.solid != 0xFFFFFFFF).swapaxes(0, 1)
+    assert shown.sum() > 500
+    return images[shown], expected[shown]
+
+
+def off(images: Float64, expected: Float64) -> float:
+    """Largest difference beyond half floats' steps, relative to light above 1."""
+    error = np.abs(images - expected) - HALF * np.abs(expected)
+    return float((error / np.maximum(1.0, np.abs(expected))).max())
+
+
+def random_light(rng: np.random.Generator) -> Light:
+    """Before the wall, within a window's size of it, turned more or less towards it."""
+    kind = rng.choice(["directional", "point", "spot"])
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    axis = np.array([*rng.uniform(-0.4, 0.4, 2), 1.0])
+    turn[:, 2] = axis / np.linalg.norm(axis)
+    turn[:, :2] = np.linalg.svd(turn[:, 2:])[0][:, 1:]
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn * rng.uniform(0.1, 10.0)
+    matrix[:3, 3] = [*rng.uniform(-90, 90, 2), rng.uniform(20, 200)]
+    outer = rng.uniform(0.1, math.pi / 2)
+    return Light(
+        "light",
+        kind,
+        matrix,
+        tuple(rng.uniform(0.0, 1.0, 3)),
+        rng.uniform(0.1, 3.0) * (1.0 if kind == "directional" else 1e4),
+        None if rng.random() < 0.5 else rng.uniform(50.0, 300.0),
+        outer * rng.uniform(0.0, 0.9),
+        outer,
+    )
+
+
+def lamp_at(x: float, y: float, z: float, candela: float, reach: float | None = None) -> Light:
+    matrix = np.eye(4)
+    matrix[:3, 3] = x, y, z
+    return Light("lamp", "point", matrix, intensity=candela, range=reach)
+
+
+# ---- lights -----------------------------------------------------------------------------------
+
+
+# Normals are rounded by up to 1e-4 rad, which a highlight of roughness 0.3, α = 0.09, changes by up
+# to 1e-4/α of itself; the largest measured over 150 scenes is 2e-4.
+LIGHT_TOLERANCE = 1e-3
+
+
+@examples(20)
+@given(seed=seeds)
+def test_random_lights(device: Device, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    lights = tuple(random_light(rng) for _ in range(rng.integers(1, 6)))
+    material = Material(
+        "lit", (*rng.uniform(0, 1, 3), 1.0), metallic=rng.random(), roughness=rng.uniform(0.3, 1)
+    )
+    assert off(*difference(device, wall(material, lights))) < LIGHT_TOLERANCE
+
+
+def test_as_many_lights_as_there_may_be(device: Device, rng: np.random.Generator) -> None:
+    lights = tuple(random_light(rng) for _ in range(256))
+    scene = wall(Material("lit", metallic=0.0, roughness=0.5), lights)
+    assert off(*difference(device, scene)) < LIGHT_TOLERANCE
+
+
+def test_lights_put_out_the_key_light_and_leave_the_studio(device: Device) -> None:
+    material = Material("white", metallic=0.0, roughness=1.0)
+    dark = Light("dark", "point", np.eye(4), intensity=0.0)
+    images, expected = difference(device, wall(material, (dark,)))
+    assert off(images, expected) < LIGHT_TOLERANCE
+    with_key, _ = difference(device, wall(material))
+    assert np.median(with_key - images) > 0.2  # the planted fault of a key light that stays
+    assert images.min() > 0.1
+
+
+def white_wall_under(device: Device, light: Light) -> Float64:
+    """Radiance [row, column] of a flat white wall at z = 0 in a view from the middle, by the light
+    alone; almost all of it diffuse, since roughness is 1."""
+    rig, grid = views(49, 27, 1)
+    scene = wall(Material("white", metallic=0.0, roughness=1.0), (light,), bend=0.0)
+    with passes(device, scene, rig, grid, environment="none") as opened:
+        return np.asarray(opened.images()[0, :, :, 0])
+
+
+def test_a_lamp_before_a_wall(device: Device) -> None:
+    """I·cos/(π·d²) below the lamp and beside it; the wall's sheen adds at most 4 %/4 of it."""
+    image = white_wall_under(device, lamp_at(0, 0, 50, 2500.0 * math.pi))
+    row, column = 13, 24
+    assert 1.0 <= image[row, column] < 1.011
+    profile = DisplayProfile.load(PAPER)
+    beside = (np.arange(49) - 24) * profile.size_mm[0] / 49
+    falls = image[row] / image[row, column]
+    lit = np.abs(beside) < 65
+    expected = (1.0 + (beside / 50.0) ** 2) ** -1.5
+    # Away from the middle the sheen is another's; 2 % of the light at most.
+    np.testing.assert_allclose(falls[lit], expected[lit], rtol=0.02)
+
+
+def test_ranges_and_cones_end_light(device: Device) -> None:
+    matrix = np.eye(4)
+    matrix[2, 3] = 50.0
+    spot = Light("spot", "spot", matrix, (1, 1, 1), 2500.0 * math.pi, None, 0.0, math.atan(0.5))
+    image = white_wall_under(device, spot)
+    profile = DisplayProfile.load(PAPER)
+    x = (np.arange(49) - 24) * profile.size_mm[0] / 49
+    y = (13 - np.arange(27)) * profile.size_mm[1] / 27
+    inside = np.hypot(x, y[:, None]) < 25.0
+    assert np.all(image[inside] > 0.0)
+    assert np.all(image[~inside] == 0.0)
+    short, long = (lamp_at(0, 0, 50, 2500.0 * math.pi, reach) for reach in (49.9, 100.0))
+    assert np.all(white_wall_under(device, short) == 0.0)
+    assert white_wall_under(device, long)[13, 24] == pytest.approx(1.005 * 15 / 16, rel=0.01)
+
+
+def test_lamps_far_from_the_origin(device: Device) -> None:
+    """A room a thousand kilometres off looks the same, to 1e6/2⁵² of its window and so to the bit
+    of float32, because lights are told from the window's centre."""
+    material = Material("lit", metallic=0.0, roughness=0.5)
+    lamp = lamp_at(20, 10, 40, 5000.0)
+    scene = wall(material, (lamp,))
+    here, _ = difference(device, scene)
+    away = np.eye(4)
+    away[:3, 3] = [1e9, -2e9, 5e8]
+    moved = Scene(
+        "far",
+        scene.meshes,
+        (Instance("wall", 0, away),),
+        scene.materials,
+        lights=(Light("lamp", "point", away @ lamp.world_from_light, intensity=5000.0),),
+    )
+    there, _ = difference(device, moved, camera=np.linalg.inv(away))
+    np.testing.assert_array_equal(here, there)
+
+
+def test_a_lamp_that_touches_the_wall_makes_no_nan(device: Device) -> None:
+    for candela in (1.0, 1e30, 1e300):
+        assert np.all(np.isfinite(white_wall_under(device, lamp_at(0, 0, 0, candela))))
+
+
+def test_lights_may_move_between_frames(device: Device) -> None:
+    rig, grid = views(count=1)
+    scene = wall(Material("lit", metallic=0.0), (lamp_at(0, 0, 20, 800.0),), bend=0.0)
+    with passes(device, scene, rig, grid, environment="none") as opened:
+        held = device.ledger.total
+        brightest = []
+        for x in (-40.0, 0.0, 40.0):
+            moved = lamp_at(x, 0, 20, 1.0).world_from_light
+            opened.buffers.lighting.world_from_light = moved[None]
+            opened.buffers.place(opened.display_from_world)
+            image = opened.images()[0, :, :, 0]
+            brightest.append(
+                (int(np.argmax(image[13])) + 0.5) * grid.column_mm - 0.5 * rig.panel_mm[0]
+            )
+            assert device.ledger.total == held
+    np.testing.assert_allclose(brightest, [-40.0, 0.0, 40.0], atol=grid.column_mm)
+
+
+def lit_ball(kind: str = "metal") -> Scene:
+    """A ball that fills most of a window 2 high."""
+    theta, phi = np.meshgrid(
+        np.linspace(0, np.pi, 65), np.linspace(0, 2 * np.pi, 129), indexing="ij"
+    )
+    n = np.stack([np.sin(theta) * np.sin(phi), np.cos(theta), np.sin(theta) * np.cos(phi)], -1)
+    n = n.reshape(-1, 3).astype(np.float32)
+    a = (np.arange(64)[:, None] * 129 + np.arange(128)).ravel()
+    triangles = np.concatenate(
+        [np.stack([a, a + 129, a + 130], 1), np.stack([a, a + 130, a + 1], 1)]
+    ).astype(np.uint32)
+    count = len(n)
+    ball = Mesh(
+        "ball", 0.8 * n, n, np.zeros((count, 2, 2), np.float32), np.ones((count, 4), np.float32),
+        triangles, 0,
+    )  # fmt: skip
+    metallic = 1.0 if kind == "metal" else 0.0
+    material = Material(kind, metallic=metallic, roughness=0.25)
+    return Scene("ball", (ball,), (Instance("ball", 0, np.eye(4)),), (material,))
+
+
+WINDOW = Camera((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), 2.0)
+FRONT = Camera((0.0, 0.0, 0.8), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), 2.0)
+
+
+def looks(device: Device, scene: Scene, camera: Camera = WINDOW, **options: object) -> Float64:
+    """Views of a scene, 0…1 [view, y, x, rgb]."""
+    display = DisplayProfile.load(PAPER)
+    with Renderer(device) as renderer:
+        options = {"views": 5, "view_size": (96, 54), **options}
+        return renderer.views(scene, display, camera, **options) / 255.0
+
+
+def brightest_column(picture: Float64) -> float:
+    """Mean column of a picture's brightest hundredth."""
+    light = picture.sum(axis=-1)
+    return float(np.argwhere(light >= np.quantile(light, 0.99))[:, 1].mean())
+
+
+@pytest.mark.parametrize("technique", ["lfdpr", "mvr"])
+def test_highlights_move_between_views(device: Device, technique: str) -> None:
+    """The window touches the ball's front, so what is painted there stays; the mirrored lamp
+    appears to stand behind the surface and moves along with an eye that moves to the right."""
+    lamp = lamp_at(0, 2, 4, 20.0)
+    paint = Material("painted", (1.0, 1.0, 1.0, 1.0), metallic=0.0, roughness=1.0)
+    shifts = []
+    for material in (lit_ball().materials[0], paint):
+        ball = lit_ball()
+        scene = Scene("ball", ball.meshes, ball.instances, (material,), lights=(lamp,))
+        pictures = looks(device, scene, FRONT, technique=technique, environment="none")
+        shifts.append(np.diff([brightest_column(picture) for picture in pictures]))
+    mirrored, painted = shifts
+    assert np.all(mirrored > 1.0)
+    assert np.all(np.abs(painted) < 0.5)
+
+
+@pytest.mark.parametrize("environment", ["studio", "none", "picture"])
+def test_both_techniques_light_alike(
+    device: Device, rng: np.random.Generator, environment: str
+) -> None:
+    ball = lit_ball("plastic")
+    lights = tuple(lamp_at(x, 2.0, 3.0, 8.0) for x in (-2.0, 2.0))
+    scene = Scene("ball", ball.meshes, ball.instances, ball.materials, lights=lights)
+    chosen = smooth_picture(rng) if environment == "picture" else environment
+    pictures = [
+        looks(device, scene, technique=technique, environment=chosen, environment_turn_rad=0.4)
+        for technique in ("lfdpr", "mvr")
+    ]
+    # Edges of the ball may belong to the one or to the other; elsewhere attributes interpolated by
+    # hardware are off by less than a level.
+    unlike = np.abs(pictures[0] - pictures[1]).max(axis=-1) > 1.5 / 255
+    assert unlike.mean() < 0.005
+
+
+# ---- environments -----------------------------------------------------------------------------
+
+
+def directions_of(rows: int, columns: int) -> Float64:
+    """What the texels of a picture show, [y, x, xyz]."""
+    theta, phi = np.meshgrid(
+        (np.arange(rows) + 0.5) * np.pi / rows,
+        ((np.arange(columns) + 0.5) / columns - 0.5) * 2 * np.pi,
+        indexing="ij",
+    )
+    return np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], -1)
+
+
+def smooth_picture(rng: np.random.Generator, rows: int = 64) -> Environment:
+    """Light that differs by direction and channel and has no edges."""
+    d = directions_of(rows, 2 * rows)
+    light = 1.0 + sum(
+        rng.uniform(0.1, 0.3, 3) * np.sin(rng.uniform(1, 4) * (d @ rng.normal(size=3)))[..., None]
+        for _ in range(3)
+    )
+    return Environment("smooth", np.asarray(light, np.float32))
+
+
+def even_picture(*radiance: float) -> Environment:
+    return Environment("even", np.full((4, 8, 3), radiance, np.float32))
+
+
+@pytest.mark.parametrize("radiance", [0.25, 1.0, 3e4])
+def test_even_light_furnace(device: Device, radiance: float) -> None:
+    """Even light of radiance L is L to every lobe and normal, on all levels: the map holds it to a
+    step of half floats, the harmonics to the sums' rounding."""
+    found = prefiltered(device, even_picture(radiance, radiance, 2.0 * radiance))
+    for level in range(found.radiance.levels):
+        texels = found.radiance.read(np.float16, gl.HALF_FLOAT, level)[..., :3].astype(np.float64)
+        np.testing.assert_allclose(
+            texels / radiance, np.broadcast_to([1, 1, 2], texels.shape), rtol=HALF
+        )
+    found.release()
+    rng = np.random.default_rng(1)
+    normals = rng.normal(size=(50, 3))
+    n = np.column_stack([normals / np.linalg.norm(normals, axis=1, keepdims=True), np.ones(50)])
+    diffuse = np.einsum("ni,cij,nj->nc", n, found.diffuse, n)
+    np.testing.assert_allclose(diffuse / radiance, [[1, 1, 2]] * 50, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("metallic", "roughness", "low", "high"),
+    [
+        # White scatters all that comes and mirrors 4 % or more besides, as under the key light:
+        # glTF's fresnel_mix would take that off what is scattered.
+        (0.0, 1.0, 1.01, 1.02),
+        (0.0, 0.3, 1.03, 1.10),
+        # A smooth metal mirrors all.
+        (1.0, 0.0, 0.995, 1.005),
+        # A rough one loses what would bounce between its facets more than once.
+        (1.0, 1.0, 0.44, 0.46),
+    ],
+)
+def test_white_surfaces_in_even_light(
+    device: Device, metallic: float, roughness: float, low: float, high: float
+) -> None:
+    scene = wall(Material("white", metallic=metallic, roughness=roughness), bend=1.0)
+    level = 0.5
+    images, expected = difference(
+        device, scene, Panorama(np.full((4, 8, 3), level)), environment=even_picture(*[level] * 3)
+    )
+    assert off(images, expected) < 1e-4
+    assert low * level * (1 - HALF) <= images.min()
+    assert images.max() <= high * level
+
+
+@pytest.mark.parametrize("roughness", [0.0, 0.2, 0.45, 0.8, 1.0])
+@pytest.mark.parametrize("metallic", [0.0, 1.0])
+def test_pictures_light_as_their_integrals_say(
+    device: Device, rng: np.random.Generator, metallic: float, roughness: float
+) -> None:
+    """The map against the integral itself for each pixel. Between levels the device mixes two
+    lobes for one, and its samples read texels with weights of 8 bits; 0.006 measured."""
+    environment = smooth_picture(rng)
+    material = Material("white", (0.9, 0.6, 0.3, 1.0), metallic=metallic, roughness=roughness)
+    turn, intensity = 2.0, 0.7
+    reference = Adjusted(Panorama(environment.pixels), turn, intensity)
+    images, expected = difference(
+        device, wall(material, bend=1.5), reference,
+        environment=environment, turn_rad=turn, intensity=intensity,
+    )  # fmt: skip
+    assert off(images, expected) < 0.012
+
+
+def test_none_is_dark_and_the_studio_may_be_turned(device: Device) -> None:
+    scene = wall(
+        Material(
+            "white", (0.8, 0.8, 0.8, 1.0), metallic=0.5, roughness=0.5, emissive=(0.1, 0.2, 0.3)
+        )
+    )
+    images, expected = difference(device, scene, Darkness(), environment="none")
+    assert off(images, expected) < HALF
+    np.testing.assert_allclose(images, [[0.1, 0.2, 0.3]] * len(images), rtol=HALF)
+    adjusted = difference(device, scene, Adjusted(studio, 1.0, 0.5), turn_rad=1.0, intensity=0.5)
+    assert off(*adjusted) < LIGHT_TOLERANCE
+    assert off(adjusted[0], difference(device, scene)[1]) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("column", "side"), [(12, "front"), (8, "right"), (0, "left"), (None, "top")]
+)
+@pytest.mark.parametrize("technique", ["lfdpr", "mvr"])
+def test_a_bright_spot_lights_its_side(
+    device: Device, technique: str, column: int | None, side: str
+) -> None:
+    """Columns 0, 4, 8, 12 of 16 show −x, −z, +x, +z; a ball before the viewer is lit from there."""
+    pixels = np.zeros((8, 16, 3), np.float32)
+    if column is None:
+        pixels[0] = 30.0
+    else:
+        pixels[3:5, [column, column - 1]] = 10.0  # a direction lies between two columns
+    picture = looks(
+        device,
+        lit_ball("plastic"),
+        technique=technique,
+        environment=Environment("spot", pixels),
+        views=1,
+    )[0]
+    light = picture.sum(axis=-1)
+    y, x = np.mgrid[:54, :96]
+    at = np.array([(light * (x - 47.5)).sum(), (light * (26.5 - y)).sum()]) / light.sum()
+    expected = {"front": (0, 0), "right": (1, 0), "left": (-1, 0), "top": (0, 1)}[side]
+    assert np.all(np.sign(np.round(at / 6.0)) == expected)
+
+
+def test_seams_and_poles_do_not_show(device: Device, rng: np.random.Generator) -> None:
+    """Neighbouring directions across the ±180° meridian, the poles and the edges of the cube's
+    faces get neighbouring light: the device's lookups differ no more there than the picture's."""
+    environment = smooth_picture(rng, 256)
+    rig, grid = views(160, 90, 1)
+    for middle in ((-1.0, 0, 0), (0, 1.0, 0), (0, -1.0, 0), (1.0, 1.0, 1.0), (0.5, 0.3, 1.0)):
+        for roughness in (0.0, 0.3, 0.6):
+            scene = wall(Material("mirror", metallic=1.0, roughness=roughness), bend=0.2)
+            turn = turn_to(np.array(middle))
+            placed = Scene("turned", scene.meshes, (Instance("wall", 0, turn),), scene.materials)
+            camera = np.linalg.inv(turn)
+            with passes(device, placed, rig, grid, camera, environment=environment) as opened:
+                image = opened.images()[0]
+            lit = image[20:70, 50:110]
+            # Half floats of light below 2 step by 2⁻¹⁰; a smooth picture bends by less than that.
+            bends = np.abs(np.diff(lit, 2, axis=0)).max(), np.abs(np.diff(lit, 2, axis=1)).max()
+            assert max(bends) < 6 * 2.0**-10
+
+
+def turn_to(direction: Float64) -> Float64:
+    """world_from_local that turns +z to a direction."""
+    z = direction / np.linalg.norm(direction)
+    x = np.cross([0.0, 1, 0] if abs(z[1]) < 0.9 else [1.0, 0, 0], z)
+    x /= np.linalg.norm(x)
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
+    return matrix
+
+
+def test_a_sun_stays_finite_and_gives_its_light(device: Device) -> None:
+    """Radiance of 1e5 and 1e12 on one texel: level 0 is cut at half floats' largest, further levels
+    hold the mean of the true light, or as much of it as halves hold."""
+    for radiance in (1e5, 1e12):
+        pixels = np.full((64, 128, 3), 0.5, np.float32)
+        pixels[20, 40] = radiance
+        found = prefiltered(device, Environment("sun", pixels))
+        for level in range(found.radiance.levels):
+            texels = found.radiance.read(np.float16, gl.HALF_FLOAT, level)[..., :3]
+            assert np.all(np.isfinite(texels))
+            assert texels.min() >= 0.5 * (1 - HALF)
+        if radiance == 1e5:
+            # Of roughness 1 all mirrored directions are alike, so that the mean is ∫L·cos/π; texels
+            # and their samples are 11° apart, which a spot of 3° shows as up to 10 % too bright.
+            solid = (2 * np.pi / 128) * (np.pi / 64) * np.sin(20.5 * np.pi / 64)
+            assert texels.max() == pytest.approx(0.5 + radiance * solid / np.pi, rel=0.1)
+        assert np.all(np.isfinite(found.diffuse))
+        found.release()
+    images, _ = difference(
+        device, wall(Material("mirror", roughness=0.1), bend=3.0), Darkness(),
+        environment=Environment("sun", pixels),
+    )  # fmt: skip
+    assert np.all(np.isfinite(images))
+
+
+def test_environments_are_kept_and_let_go(device: Device, rng: np.random.Generator) -> None:
+    display, before = DisplayProfile.load(PAPER), device.ledger.total
+    scene, environment = lit_ball(), smooth_picture(rng)
+    with Renderer(device) as renderer:
+
+        def held(chosen: str | Environment) -> int:
+            renderer.views(scene, display, WINDOW, views=1, view_size=(16, 9), environment=chosen)
+            return device.ledger.total
+
+        first = held(environment)
+        assert held(environment) == held("studio") == first
+        assert held(smooth_picture(rng)) == first
+    assert device.ledger.total == before
