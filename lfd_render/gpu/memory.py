@@ -172,7 +172,8 @@ class TextureArray(Owned):
         """size: (width, height, layers) in texels."""
         width, height, layers = size
         info = device.info
-        if max(width, height) > info.max_texture_size or layers > info.max_array_layers:
+        most_layers = layers if self._target == gl.TEXTURE_CUBE_MAP else info.max_array_layers
+        if max(width, height) > info.max_texture_size or layers > most_layers:
             raise ResourceError(
                 f"texture '{label}': {width}×{height} with {layers} layers exceeds the limits of "
                 f"{device.name} ({info.max_texture_size} texels, {info.max_array_layers} layers); "
