@@ -1,5 +1,6 @@
 """Options that several commands share, and what their texts mean."""
 
+import math
 import re
 from enum import StrEnum
 from typing import Annotated
@@ -56,13 +57,13 @@ def parse_exposure(text: str | None) -> float:
     """The factor of ``0.5``, or of ``-1EV``: so many doublings. None is 1. Raises UsageError."""
     if text is None:
         return 1.0
-    match = re.fullmatch(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(ev)?", text.strip().lower())
+    number = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?"
+    match = re.fullmatch(rf"({number})(ev)?", text.strip().lower())
     if match:
-        number = float(match[1])
-        in_range = abs(number) <= MAX_EXPOSURE_EV if match[2] else number > 0
-        factor = 2.0**number if match[2] and in_range else number
-        if in_range and 2.0**-MAX_EXPOSURE_EV <= factor <= 2.0**MAX_EXPOSURE_EV:
-            return factor
+        value = float(match[1])
+        stops = value if match[2] else math.log2(value) if 0 < value < math.inf else math.inf
+        if abs(stops) <= MAX_EXPOSURE_EV:
+            return 2.0**value if match[2] else value
     raise UsageError(
         f"--exposure: '{text}'; give a factor above 0, as 0.5, or stops, as -1.5EV, "
         f"at most {MAX_EXPOSURE_EV} of them"

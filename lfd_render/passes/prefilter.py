@@ -16,6 +16,7 @@ LAST_FACE = 8  # texels along an edge of the level of roughness 1
 FACES = (256, 512)  # least and most of the level that mirrors read
 FEWEST_SAMPLES = 256  # of a lobe, at the smoothest level that is not a mirror
 FINEST_ROWS = 256  # least rows of directions that irradiance is summed over
+GOLDEN_ANGLE_RAD = np.pi * (3.0 - np.sqrt(5.0))
 _GROUP = 8  # local_size_x and _y of the kernels
 
 Float64 = NDArray[np.float64]
@@ -96,36 +97,27 @@ def lobe_count(level: int) -> int:
 def lobe_samples(roughness: float, count: int, face: int) -> Float64:
     """What a lobe about +z reads: unit direction (times its share) and level of the source, [n, 4].
 
-    Half vectors by GGX (Walter et al. 2007, equation 35) on a Hammersley set. A sample of density p
-    stands for 1/(n·p) of the sphere, and reads the level whose texels are as large, and half a
-    level more, which keeps the samples' pattern from showing (Křivánek and Colbert 2008).
+    Half vectors by GGX (Walter et al. 2007, equation 35) on a golden spiral, which has no streaks.
+    A sample of density p stands for 1/(n·p) of the sphere and reads a level whose texels are four
+    times as large, so that the samples' pattern does not show (Křivánek and Colbert 2008).
     """
     if roughness == 0.0:
         return np.array([[0.0, 0.0, 1.0, 0.0]])
     alpha_2 = roughness**4
     index = np.arange(count)
-    u, phi = (index + 0.5) / count, 2.0 * np.pi * radical_inverse(index)
+    u, phi = (index + 0.5) / count, GOLDEN_ANGLE_RAD * index
     cos_2 = (1.0 - u) / (1.0 + (alpha_2 - 1.0) * u)
     cos, sin = np.sqrt(cos_2), np.sqrt(1.0 - cos_2)
     along = 2.0 * cos * sin  # the mirrored eye, 2·cos·h − z
     light = np.stack([along * np.cos(phi), along * np.sin(phi), 2.0 * cos_2 - 1.0], axis=-1)
     density = alpha_2 / (np.pi * (cos_2 * (alpha_2 - 1.0) + 1.0) ** 2) / 4.0
     texel = 4.0 * np.pi / (6.0 * face * face)
-    level = np.maximum(0.0, 0.5 * np.log2(1.0 / (count * density * texel)) + 0.5)
+    level = np.maximum(0.0, 0.5 * np.log2(1.0 / (count * density * texel)) + 1.0)
     above = light[:, 2] > 0.0
     light, level = light[above], level[above]
     # Directions carry their share n·l / Σ n·l in their length: sampling a cube ignores it.
     share = light[:, 2:] / light[:, 2].sum()
     return np.concatenate([light * share, level[:, None]], axis=-1)
-
-
-def radical_inverse(index: NDArray[np.int64]) -> Float64:
-    """Binary digits of whole numbers mirrored at the point, 0…1 (van der Corput)."""
-    result, weight = np.zeros(len(index)), 0.5
-    for bit in range(32):
-        result += weight * (index >> bit & 1)
-        weight /= 2.0
-    return result
 
 
 def irradiance(pixels: NDArray[np.float32]) -> Float64:

@@ -7,8 +7,11 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import OpenImageIO as oiio
 import pytest
+from numpy.typing import NDArray
 
+from lfd_render.cli.options import parse_exposure
 from lfd_render.display import Camera
 from lfd_render.panel.picture import read_picture
 
@@ -49,6 +52,69 @@ def test_options_reach_the_renderer(
         "environment_intensity": 1.0,
         "exposure": 1.0,
     }
+
+
+def test_light_reaches_the_renderer(
+    command: Command, renderer: FakeRenderer, scene: Path, display: Path, tmp_path: Path
+) -> None:
+    sky = tmp_path / "sky.exr"
+    write_panorama(sky, np.full((2, 4, 3), 0.5, np.float32))
+    arguments = ("render", scene, "-o", tmp_path / "a.png", "-d", display)
+    result = command(
+        *arguments, "--environment", sky, "--environment-turn", 90,
+        "--environment-intensity", 0.25, "--exposure", "-1.5EV",
+    )  # fmt: skip
+    assert result.code == 0
+    call = renderer.calls[0]
+    assert call["environment"].name == str(sky)
+    assert call["environment_turn_rad"] == pytest.approx(math.pi / 2)
+    assert call["environment_intensity"] == pytest.approx(0.25)
+    assert call["exposure"] == pytest.approx(2**-1.5)
+    assert command(*arguments, "--environment", "none").code == 0
+    assert renderer.calls[1]["environment"] == "none"
+
+
+@pytest.mark.parametrize(
+    ("text", "factor"),
+    [("1", 1), ("0.25", 0.25), (".5", 0.5), ("1e-3", 1e-3), ("+1.5EV", 2**1.5), ("-9ev", 2**-9),
+     ("0EV", 1)],
+)  # fmt: skip
+def test_exposure_is_a_factor_or_stops(text: str, factor: float) -> None:
+    assert parse_exposure(text) == pytest.approx(factor)
+
+
+@pytest.mark.parametrize(
+    "text", ["0", "-1", "nan", "inf", "1e99", "61EV", "EV", "1 2", "", "1E", "९"]
+)
+def test_exposures_that_make_no_picture(
+    command: Command, scene: Path, text: str, tmp_path: Path
+) -> None:
+    result = command("render", scene, "-o", tmp_path / "a.png", "--exposure", text)
+    assert result.code == 2
+    assert result.error.startswith(f"--exposure: '{text}'; give a factor above 0")
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "expected"),
+    [
+        (["--environment", "no such.exr"], 7, "no such.exr: no such file; give an EXR, HDR"),
+        (["--environment-turn", "nan"], 2, "--environment-turn: nan; give a finite number"),
+        (["--environment-intensity", "-1"], 2, "--environment-intensity: -1.0; give a number"),
+    ],
+)
+def test_bad_environments(
+    command: Command, scene: Path, options: list[str], code: int, expected: str, tmp_path: Path
+) -> None:
+    result = command("render", scene, "-o", tmp_path / "a.png", *options)
+    assert result.code == code
+    assert result.error.startswith(expected)
+
+
+def write_panorama(path: Path, pixels: NDArray[np.float32]) -> None:
+    out = oiio.ImageOutput.create(str(path))
+    assert out.open(str(path), oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "float"))
+    assert out.write_image(pixels)
+    out.close()
 
 
 def test_json_is_one_object_and_messages_go_to_stderr(
