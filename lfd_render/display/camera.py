@@ -23,6 +23,7 @@ Vec3 = tuple[float, float, float]
 
 FRAMED = 0.94  # of the window's width and height: a margin of 6 %
 DEPTH_RANGES = 2.0  # deepest framed scene, in comfortable ranges
+_LEAST_SIZE = 1e-290  # of a framed scene: what is smaller, or larger than 1/this, overflows in mm
 
 
 class _CameraFile(StrictModel):
@@ -80,8 +81,15 @@ class Camera:
         yaw = np.array([[cos, 0.0, -sin], [0.0, 1.0, 0.0], [sin, 0.0, cos]])
         depth = np.diag([1.0, 1.0, self.depth_scale])
         display_from_world = np.eye(4)
-        display_from_world[:3, :3] = depth @ yaw @ rotation * (panel_mm[1] / self.window_height)
-        display_from_world[:3, 3] = -display_from_world[:3, :3] @ np.array(self.target)
+        with np.errstate(over="ignore", invalid="ignore"):
+            scale = np.float64(panel_mm[1]) / self.window_height
+            display_from_world[:3, :3] = depth @ yaw @ rotation * scale
+            display_from_world[:3, 3] = -display_from_world[:3, :3] @ np.array(self.target)
+        if not np.isfinite(display_from_world).all():
+            raise SceneError(
+                f"camera: window_height {self.window_height} with target {list(self.target)} and "
+                f"depth_scale {self.depth_scale}: beyond double precision; scale the scene"
+            )
         return display_from_world
 
     @staticmethod
@@ -120,14 +128,15 @@ class Camera:
         The box fits 94 % of the window in every view, near parts counted in perspective, its
         depth centred on the window. Deeper than twice the comfortable range (and than D, so
         that nothing comes closer than half way to the eyes) it is squeezed to that depth.
-        Raises SceneError for a box that is empty or not finite.
+        Raises SceneError for a box that is empty, not finite, or beyond 1e±300.
         """
         low, high = np.asarray(bounds_min, np.float64), np.asarray(bounds_max, np.float64)
-        size = high - low
-        if not (np.isfinite(size).all() and (size >= 0).all() and size.any()):
+        with np.errstate(over="ignore", invalid="ignore"):
+            size = high - low
+        if not ((size >= 0).all() and _LEAST_SIZE < size.max(initial=0.0) < 1.0 / _LEAST_SIZE):
             raise SceneError(
                 f"scene: its bounds are {low.tolist()} to {high.tolist()}; they should be finite "
-                "and have an extent"
+                "and have an extent, neither too small nor too large"
             )
         limit_mm = min(DEPTH_RANGES * sum(comfortable_depth_mm(profile)), profile.distance_mm)
         scale = _largest_fitting_scale(size, limit_mm, profile)

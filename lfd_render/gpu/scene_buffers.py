@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from lfd_render.errors import SceneError
 from lfd_render.gpu.layout import CONSTANTS, TEXTURE_ROLES, dtype
 from lfd_render.gpu.lighting import Lighting
 from lfd_render.gpu.memory import Buffer, TextureArray
@@ -159,10 +160,16 @@ class SceneBuffers:
 
     def place(self, display_from_world: NDArray[np.float64]) -> None:
         """Write the draws for a camera. display_from_world: float64 [4, 4]."""
-        matrices = display_from_world @ self._world_from_local
-        self._records["display_from_local"] = (
-            matrices.transpose(0, 2, 1).reshape(-1, 16).astype(np.float32)
-        )
+        with np.errstate(over="ignore", invalid="ignore"):
+            matrices = display_from_world @ self._world_from_local
+            words = matrices.transpose(0, 2, 1).reshape(-1, 16).astype(np.float32)
+        if not np.isfinite(words).all():
+            name = self.scene.instances[int(np.argmin(np.isfinite(words).all(axis=1)))].name
+            raise SceneError(
+                f"scene '{self.scene.name}': instance '{name}': too small, large or far away "
+                "beside the camera's window for single precision; scale it or move the camera"
+            )
+        self._records["display_from_local"] = words
         mirrored = np.linalg.det(matrices[:, :3, :3]) < 0.0
         self._records["facing"] = np.where(mirrored, CONSTANTS["FACING_MIRRORED"], 0) | np.where(
             self._double_sided, CONSTANTS["FACING_BOTH"], 0

@@ -22,6 +22,16 @@ class Placement:
         """The inverse, float64 [4, 4]."""
         return np.linalg.inv(self.display_from_world).astype(np.float64)
 
+    @cached_property
+    def turn_from_display(self) -> NDArray[np.float64]:
+        """The inverse of a direction, up to a positive factor, float64 [4, 4]: its largest entry is
+        1, so that shaders may square what they turn, however large or small the world is."""
+        turn = np.eye(4)
+        forth = self.display_from_world[:3, :3]
+        back = np.linalg.inv(forth / np.abs(forth).max())
+        turn[:3, :3] = back / np.abs(back).max()
+        return turn
+
 
 def gl_matrix(matrix: NDArray[np.float64]) -> bytes:
     """A [4, 4] matrix of column vectors as a mat4 uniform: float32, column by column."""

@@ -71,7 +71,7 @@ class Shade:
         views: ViewBuffers,
         placement: Placement,
     ) -> None:
-        world_from_display = gl_matrix(placement.world_from_display)
+        world_from_display = gl_matrix(placement.turn_from_display)
         for batch in batches:
             shared = {
                 "FrameBlock": band.frame(batch),

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from lfd_render.errors import LfdError, ResourceError, SceneError
 from lfd_render.scene.builtin import PREFIX, load_builtin
+from lfd_render.scene.findings import findings
 from lfd_render.scene.gltf import load_gltf
 from lfd_render.scene.limits import LoadLimits
 from lfd_render.scene.model import Scene
@@ -50,7 +52,7 @@ def _load_file(path: Path, limits: LoadLimits) -> Scene:
             f"instances: {scene.triangle_count} triangles drawn; the limit is "
             f"{limits.drawn_triangles}, give a smaller scene"
         )
-    return scene
+    return replace(scene, warnings=(*scene.warnings, *findings(scene)))
 
 
 def _one_line(message: str) -> str:

@@ -36,10 +36,14 @@ def load_obj(path: Path, limits: LoadLimits) -> Scene:
     budget.take("mesh_bytes", _VERTEX_BYTES * len(corners) + _TRIANGLE_BYTES * len(triangles))
     names, material_of_face = _materials_by_face(tables)
     vertices = _Vertices(tables, corners, triangles)
+    if vertices.replaced_normals:
+        warnings[f"vn: {vertices.replaced_normals} normals without direction replaced"] = None
+    material_of_triangle = material_of_face[faces]
+    order = np.argsort(material_of_triangle, kind="stable")
+    ends = np.cumsum(np.bincount(material_of_triangle, minlength=len(names)))
     meshes: list[Mesh] = []
     materials: list[Material] = []
-    for index, name in enumerate(names):
-        chosen = triangles[material_of_face[faces] == index]
+    for name, chosen in zip(names, np.split(triangles[order], ends[:-1]), strict=True):
         if len(chosen):
             meshes.append(vertices.mesh(name or path.stem, chosen, len(materials)))
             materials.append(DEFAULT if name is None else palette.material(name))
@@ -131,10 +135,11 @@ class _Vertices:
         self._colors = np.ones((len(corners), 4), np.float32)
         if tables.colors is not None:
             self._colors[:, :3] = _linear(np.clip(tables.colors[v], 0.0, 1.0))
+        self.replaced_normals = 0
         self._normals = self._sound_normals(tables, v, vn, triangles)
 
-    @staticmethod
     def _sound_normals(
+        self,
         tables: ObjTables,
         v: NDArray[np.int64],
         vn: NDArray[np.int64],
@@ -145,6 +150,7 @@ class _Vertices:
         bad = without_direction(given)
         if not bad.any():
             return unit(given)
+        self.replaced_normals = int(np.count_nonzero(bad & (vn >= 0)))
         positions = tables.positions.astype(np.float32)
         place = _welded(positions)  # seams are often written as vertices of their own
         smooth = smooth_normals(positions, place[v[triangles]])
@@ -152,16 +158,14 @@ class _Vertices:
 
     def mesh(self, name: str, triangles: NDArray[np.int64], material: int) -> Mesh:
         """The mesh of some of the triangles, with the vertices that they use."""
-        touched = np.zeros(len(self._positions), bool)
-        touched[triangles] = True
-        place = np.cumsum(touched, dtype=np.uint32) - np.uint32(1)
+        used, place = np.unique(triangles, return_inverse=True)
         return Mesh(
             name,
-            self._positions[touched],
-            self._normals[touched],
-            self._texcoords[touched],
-            self._colors[touched],
-            place[triangles],
+            self._positions[used],
+            self._normals[used],
+            self._texcoords[used],
+            self._colors[used],
+            place.reshape(-1, 3).astype(np.uint32),
             material,
         )
 
