@@ -65,7 +65,7 @@ class RasterForward:
         clip = band_clip_from_display(rig, self._target.grid, band, view)
         camera: _Camera = {
             "clip_from_display": gl_matrix(clip),
-            "world_from_display": gl_matrix(placement.turn_from_display),
+            "turn_from_display": gl_matrix(placement.turn_from_display),
             "eye_mm": eye_mm,
         }
         batches = list(zip(self._scene.batches, self._draws, strict=True))

@@ -71,7 +71,7 @@ class Shade:
         views: ViewBuffers,
         placement: Placement,
     ) -> None:
-        world_from_display = gl_matrix(placement.turn_from_display)
+        turn_from_display = gl_matrix(placement.turn_from_display)
         for batch in batches:
             shared = {
                 "FrameBlock": band.frame(batch),
@@ -92,7 +92,7 @@ class Shade:
                     "Eyes": band.target.eyes,
                     "RowOffsets": band.target.row_offsets,
                 },
-                {"world_from_display": world_from_display, "row_blocks": self._row_blocks},
+                {"turn_from_display": turn_from_display, "row_blocks": self._row_blocks},
                 {**self._scene.samplers(), **self._scene.lighting.samplers()},
             )
             kernel.run_indirect(self._work)

@@ -10,16 +10,16 @@ in vec4 uv01;
 in vec4 color;
 flat in uint material;
 
-uniform mat4 world_from_display;
+uniform mat4 turn_from_display;  // see Placement
 uniform float eye_mm;
 
 layout(location = 0) out vec4 radiance;
 
 void main() {
     Surface surface;
-    mat3 turn = mat3(world_from_display);
+    mat3 turn = mat3(turn_from_display);
     surface.to_eye = turn * (vec3(eye_mm, 0.0, frame.distance_mm) - p_display);
-    surface.place = turn * p_display;
+    surface.place = turn_from_display[3][3] * (turn * p_display);
     surface.normal = normal_world;
     surface.dp_dx = turn * dFdx(p_display);
     surface.dp_dy = turn * dFdy(p_display);

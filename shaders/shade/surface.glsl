@@ -15,7 +15,7 @@ layout(std430) readonly restrict buffer BlockWorkBlock { BlockWork block_work; }
 layout(std430) readonly restrict buffer Eyes { float eyes[]; };
 layout(std430) readonly restrict buffer RowOffsets { float row_offsets[]; };
 
-uniform mat4 world_from_display;
+uniform mat4 turn_from_display;  // see Placement
 uniform uint row_blocks;
 
 // A pixel of the views and what it shows. Nothing: background, or a triangle of another batch.
@@ -52,11 +52,11 @@ Surface surface_at(uint triangle, int view, int row, int column) {
     uint facing = draws[corners.w].facing;
 
     Surface surface;
-    surface.to_eye = mat3(world_from_display) * (vec3(eye_mm, 0.0, frame.distance_mm) - hit.p_display);
-    surface.place = mat3(world_from_display) * hit.p_display;
+    surface.to_eye = mat3(turn_from_display) * (vec3(eye_mm, 0.0, frame.distance_mm) - hit.p_display);
+    surface.place = turn_from_display[3][3] * (mat3(turn_from_display) * hit.p_display);
     surface.normal = mat3(vertex_normal(corners.x), vertex_normal(corners.y), vertex_normal(corners.z)) * hit.weights;
-    surface.dp_dx = mat3(world_from_display) * hit.dp_dx;
-    surface.dp_dy = mat3(world_from_display) * hit.dp_dy;
+    surface.dp_dx = mat3(turn_from_display) * hit.dp_dx;
+    surface.dp_dy = mat3(turn_from_display) * hit.dp_dy;
     surface.uv0 = Footprint(uv0 * hit.weights, uv0 * hit.weights_dx, uv0 * hit.weights_dy);
     surface.uv1 = Footprint(uv1 * hit.weights, uv1 * hit.weights_dx, uv1 * hit.weights_dy);
     surface.color = mat3x4(vertex_color(corners.x), vertex_color(corners.y), vertex_color(corners.z)) * hit.weights;
