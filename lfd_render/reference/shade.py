@@ -170,8 +170,9 @@ class Surface:
     def _mapped(self, normal: Float64) -> Float64:
         """Normals turned by the normal map (glTF 3.9.3): red along +u, green against +v.
 
-        The directions of u and v on the surface come from the gradients of position and texture
-        coordinate, made square to the normal. Where texture coordinates stand still there are none.
+        The direction of u on the surface comes from the gradients of position and texture
+        coordinate, made square to the normal; the third direction is square to both, on the side
+        against v. Where texture coordinates stand still there are none.
         """
         slot, texels = self._material.normal_texture, self.texture("normal_texture")
         if slot is None or texels is None:
@@ -185,7 +186,8 @@ class Surface:
         along_u = (p_dx * uv_dy[:, 1:] - p_dy * uv_dx[:, 1:]) * flip
         along_v = (p_dy * uv_dx[:, :1] - p_dx * uv_dy[:, :1]) * flip
         tangent = unit(along_u - normal * _dot(normal, along_u)[:, None])
-        bitangent = -unit(along_v - normal * _dot(normal, along_v)[:, None])
+        side = -np.sign(_dot(np.cross(normal, tangent), along_v))
+        bitangent = side[:, None] * np.cross(normal, tangent)
         map_normal = 2.0 * texels[:, :3] - 1.0
         map_normal[:, :2] *= slot.scale
         turned = unit(

@@ -23,19 +23,20 @@ struct Surface {
 };
 
 // Tangent frame from the gradients of position and texture coordinate, so that files without tangents
-// and files with them shade alike. +Y of the map is up in the picture, against v.
+// and files with them shade alike. It is square, as glTF's is, also where texture coordinates are skewed. +Y
+// of the map is up in the picture, against v.
 vec3 mapped_normal(vec3 normal, Surface surface, uint slot) {
     Footprint f = slot_footprint(surface.material, NORMAL, surface.uv0, surface.uv1);
     float determinant = f.dx.x * f.dy.y - f.dx.y * f.dy.x;
     vec3 along_u = (surface.dp_dx * f.dy.y - surface.dp_dy * f.dx.y) * sign(determinant);
     vec3 along_v = (surface.dp_dy * f.dx.x - surface.dp_dx * f.dy.x) * sign(determinant);
     vec3 tangent = along_u - normal * dot(normal, along_u);
-    vec3 bitangent = normal * dot(normal, along_v) - along_v;
-    float length_t = dot(tangent, tangent), length_b = dot(bitangent, bitangent);
-    if (length_t == 0.0 || length_b == 0.0) return normal;
+    vec3 bitangent = cross(normal, tangent);
+    float side = -sign(dot(bitangent, along_v)), length_2 = dot(tangent, tangent);
+    if (length_2 == 0.0 || side == 0.0) return normal;
     vec3 m = sample_linear(slot, f).xyz * 2.0 - 1.0;
     m.xy *= unpackHalf2x16(materials[surface.material].normal_occlusion).x;
-    return normalize(m.x * tangent * inversesqrt(length_t) + m.y * bitangent * inversesqrt(length_b) + m.z * normal);
+    return normalize((m.x * tangent + m.y * side * bitangent) * inversesqrt(length_2) + m.z * normal);
 }
 
 // Environment BRDF: scale and bias of the specular colour, a polynomial fit by Karis (2014, "Physically
