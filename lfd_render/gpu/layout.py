@@ -115,11 +115,12 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("uint", "triangle"),  # within its batch
         ("uint", "row_sides"),  # row, and DOUBLE_SIDED above it
     ),
-    # A light in world directions and units, told from the window's centre; also valid as std140.
+    # A light in world directions, told from the window's centre in shading's unit; also valid as
+    # std140.
     "Light": (
         ("vec4", "place"),  # of a directional light the unit direction to it, w = 0; else w = 1
         ("vec4", "axis"),  # unit, which way it shines
-        ("vec4", "intensity"),  # lux or candela, red, green, blue
+        ("vec4", "intensity"),  # lux, or candela for that unit; red, green, blue
         ("vec4", "fall"),  # of a cone: scale, offset of the cosine; 1/range
     ),
     # What the environment sends, its intensity included; also valid as std140.

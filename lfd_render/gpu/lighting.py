@@ -17,7 +17,7 @@ from lfd_render.scene import Light
 if TYPE_CHECKING:
     from lfd_render.gpu.device import Device
 
-_FARTHEST = 1e18  # world units; its square is a float32
+_FARTHEST, _BRIGHTEST = 1e18, 1e38  # what float32 holds, squared and as it is
 _NARROWEST = 1e-3  # least difference of a spot's cosines, as KHR_lights_punctual advises
 
 
@@ -44,7 +44,11 @@ class Lighting:
     def __init__(self, device: Device, lights: Sequence[Light]) -> None:
         self._lights = lights
         self.world_from_light = np.array([light.world_from_light for light in lights])
-        self._records = _light_records(lights)
+        self._power = np.array([np.array(light.color) * light.intensity for light in lights])
+        self._range = np.array([light.range or np.inf for light in lights])
+        self._records = np.zeros(max(1, len(lights)), dtype("Light"))
+        for record, light in zip(self._records, lights, strict=False):
+            record["fall"][:2] = cone_fall(light)
         self._light_block = Buffer.of(device, "lights", self._records)
         size = dtype("EnvironmentLight").itemsize
         self._environment_block = Buffer(device, "lights", size)
@@ -71,22 +75,31 @@ class Lighting:
         record["turn"] = (np.cos(turn_rad), np.sin(turn_rad), intensity, levels - 1)
         self._environment_block.write(record)
 
-    def place(self, window_world: NDArray[np.float64]) -> None:
-        """Write the lights for a camera. window_world: the window's centre, float64 [3].
+    def place(self, display_from_world: NDArray[np.float64]) -> None:
+        """Write the lights for a camera, float64 [4, 4].
 
-        Places are told from there because float32 would lose them far from the world's origin.
+        Shading has the world's directions, but places from the window's centre, because float32
+        would lose them far from the world's origin, in a unit that keeps squares within float32
+        (that of `Placement.turn_from_display`); candela are told for that unit too.
         """
         if not self._lights:
             return
-        # Scaled first, so that lengths neither overflow nor vanish.
-        axis = -self.world_from_light[:, :3, 2]
-        axis = axis / np.maximum(np.abs(axis).max(axis=1, keepdims=True), 1e-300)
-        axis = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-300)
-        distant = np.array([light.kind == "directional" for light in self._lights])[:, None]
-        beside = np.clip(self.world_from_light[:, :3, 3] - window_world, -_FARTHEST, _FARTHEST)
-        place = np.where(distant, -axis, beside)
-        self._records["place"] = np.concatenate([place, ~distant], axis=1)
+        linear = display_from_world[:3, :3]
+        size = np.abs(linear).max()
+        back = np.linalg.inv(linear / size)
+        unit = np.abs(back).max() / size  # of the world's
+        window_world = -back @ (display_from_world[:3, 3] / size)
+        axis = _unit(-self.world_from_light[:, :3, 2])
+        located = np.array([light.kind != "directional" for light in self._lights])[:, None]
+        with np.errstate(over="ignore", divide="ignore"):
+            beside = (self.world_from_light[:, :3, 3] - window_world) / unit
+            power = np.where(located, self._power / unit / unit, self._power)
+            reach = unit / self._range
+        place = np.where(located, np.clip(beside, -_FARTHEST, _FARTHEST), -axis)
+        self._records["place"] = np.concatenate([place, located], axis=1)
         self._records["axis"][:, :3] = axis
+        self._records["intensity"][:, :3] = np.minimum(power, _BRIGHTEST)
+        self._records["fall"][:, 2] = np.minimum(reach, _FARTHEST)
         self._light_block.write(self._records)
 
     def constants(self) -> dict[str, int]:
@@ -117,16 +130,11 @@ class Lighting:
             owner.release()
 
 
-def _light_records(lights: Sequence[Light]) -> NDArray[np.void]:
-    """What does not move; one record of darkness where there are none."""
-    records = np.zeros(max(1, len(lights)), dtype("Light"))
-    largest = float(np.finfo(np.float32).max)
-    for record, light in zip(records, lights, strict=False):
-        power = np.array(light.color) * light.intensity
-        record["intensity"][:3] = np.minimum(power, largest)
-        scale, offset = cone_fall(light)
-        record["fall"] = (scale, offset, min(_FARTHEST, 1.0 / (light.range or np.inf)), 0.0)
-    return records
+def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vectors [n, 3] at length 1; zero stays zero."""
+    # Scaled first, so that lengths neither overflow nor vanish.
+    scaled = vectors / np.maximum(np.abs(vectors).max(axis=1, keepdims=True), 1e-300)
+    return np.asarray(scaled / np.maximum(np.linalg.norm(scaled, axis=1, keepdims=True), 1e-300))
 
 
 def cone_fall(light: Light) -> tuple[float, float]:

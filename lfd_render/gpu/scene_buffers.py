@@ -175,7 +175,7 @@ class SceneBuffers:
             self._double_sided, CONSTANTS["FACING_BOTH"], 0
         )
         self.draws.write(self._records)
-        self.lighting.place(np.linalg.inv(display_from_world)[:3, 3].astype(np.float64))
+        self.lighting.place(display_from_world)
 
     def runs(self, batch: Batch) -> list[DrawRun]:
         """The batch's triangles in runs of equal raster state."""

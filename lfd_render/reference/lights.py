@@ -38,7 +38,7 @@ def arriving(light: Light, points: Float64) -> Arrival:
         return Arrival(np.tile(-axis, (len(points), 1)), np.tile(power, (len(points), 1)))
     to_light = light.world_from_light[:3, 3] - points
     distance = np.linalg.norm(to_light, axis=1)
-    directions = to_light / np.maximum(distance, 1e-18)[:, None]
+    directions = to_light / np.maximum(distance, 1e-100)[:, None]
     share = window(light, distance) * cone(light, -directions @ axis)
     return Arrival(directions, np.minimum(share[:, None] * power, MOST_IRRADIANCE))
 
@@ -46,7 +46,7 @@ def arriving(light: Light, points: Float64) -> Arrival:
 def window(light: Light, distance: Float64) -> Float64:
     """1/m² by which candela become lux at distances [n]: the inverse square, cut at the range."""
     reach = 0.0 if light.range is None else (distance / light.range) ** 4
-    return np.asarray(np.clip(1.0 - reach, 0.0, 1.0) / np.maximum(distance, 1e-18) ** 2)
+    return np.asarray(np.clip(1.0 - reach, 0.0, 1.0) / np.maximum(distance, 1e-100) ** 2)
 
 
 def cone(light: Light, cosine: Float64) -> Float64:

@@ -1,5 +1,6 @@
 // The scene's own lights (KHR_lights_punctual): directional, point and spot. Without any, LIGHTS is 0 and
-// nothing of this runs. Places are told from the window's centre, in world directions and units.
+// nothing of this runs. Places are told from the window's centre, in
+// world directions and the unit of Placement.turn_from_display, and so are candela.
 
 #include "layout/Light"
 

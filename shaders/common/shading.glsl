@@ -11,7 +11,7 @@ const float SMALLEST_ALPHA = 0.002;  // keeps the specular peak of a mirror fini
 
 struct Surface {
     vec3 to_eye;       // world, any length; not two positions, which lose precision far from 0
-    vec3 place;        // world directions and units, from the window's centre
+    vec3 place;        // from the window's centre, world directions, the unit of lights
     vec3 normal;       // interpolated, world, any length
     vec3 dp_dx;        // change of world position over a column and a row
     vec3 dp_dy;

@@ -1,5 +1,6 @@
 """Lights and environments on the device, against the reference and against plain answers."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -192,6 +193,33 @@ def test_lamps_far_from_the_origin(device: Device) -> None:
     )
     there, _ = difference(device, moved, camera=np.linalg.inv(away))
     np.testing.assert_array_equal(here, there)
+
+
+@pytest.mark.parametrize("scale", [1e-30, 1e-3, 7.0, 1e9])
+def test_light_falls_with_the_files_own_unit(device: Device, scale: float) -> None:
+    """A room and its lamps made larger look the same if candela grow with the square."""
+    material = Material("lit", metallic=0.0, roughness=0.5)
+    spot = Light(
+        "spot", "spot", lamp_at(-30, 5, 60, 1.0).world_from_light, intensity=9000.0, range=200.0
+    )
+    scene = wall(material, (lamp_at(20, 10, 40, 5000.0, 150.0), spot))
+    here, expected = difference(device, scene)
+    assert off(here, expected) < LIGHT_TOLERANCE
+    size = np.diag([scale, scale, scale, 1.0])
+    lights = tuple(
+        dataclasses.replace(
+            light,
+            world_from_light=size @ light.world_from_light,
+            intensity=light.intensity * scale**2,
+            range=light.range * scale,  # type: ignore[operator]
+        )
+        for light in scene.lights
+    )
+    instances = (Instance("wall", 0, size),)
+    scaled = dataclasses.replace(scene, instances=instances, lights=lights)
+    there, expected = difference(device, scaled, camera=np.linalg.inv(size))
+    assert off(there, expected) < LIGHT_TOLERANCE
+    np.testing.assert_allclose(here, there, atol=2 * HALF)
 
 
 def test_a_lamp_that_touches_the_wall_makes_no_nan(device: Device) -> None:
