@@ -8,8 +8,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-_LEAST_UNIT = 1e-18  # of the world in millimetres and the other way round: float32 squares it
-
 
 @dataclass(frozen=True)
 class Placement:
@@ -21,16 +19,12 @@ class Placement:
 
     @cached_property
     def turn_from_display(self) -> NDArray[np.float64]:
-        """How shaders turn directions to the world, float64 [4, 4]. The upper 3×3 is the inverse
-        over its largest entry, so that they may square what they turn, however large or small the
-        world is; the last entry is that factor, for the places of lights."""
+        """How shaders turn directions to the world, float64 [4, 4]: the inverse over its largest
+        entry, so that they may square what they turn, however large or small the world is."""
         turn = np.eye(4)
         forth = self.display_from_world[:3, :3]
-        largest = np.abs(forth).max()
-        back = np.linalg.inv(forth / largest)
-        most = np.abs(back).max()
-        turn[:3, :3] = back / most
-        turn[3, 3] = np.clip(most / largest, _LEAST_UNIT, 1.0 / _LEAST_UNIT)
+        back = np.linalg.inv(forth / np.abs(forth).max())
+        turn[:3, :3] = back / np.abs(back).max()
         return turn
 
 

@@ -19,7 +19,7 @@ void main() {
     Surface surface;
     mat3 turn = mat3(turn_from_display);
     surface.to_eye = turn * (vec3(eye_mm, 0.0, frame.distance_mm) - p_display);
-    surface.place = turn_from_display[3][3] * (turn * p_display);
+    surface.place = turn * p_display;
     surface.normal = normal_world;
     surface.dp_dx = turn * dFdx(p_display);
     surface.dp_dy = turn * dFdy(p_display);

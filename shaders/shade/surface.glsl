@@ -53,7 +53,7 @@ Surface surface_at(uint triangle, int view, int row, int column) {
 
     Surface surface;
     surface.to_eye = mat3(turn_from_display) * (vec3(eye_mm, 0.0, frame.distance_mm) - hit.p_display);
-    surface.place = turn_from_display[3][3] * (mat3(turn_from_display) * hit.p_display);
+    surface.place = mat3(turn_from_display) * hit.p_display;
     surface.normal = mat3(vertex_normal(corners.x), vertex_normal(corners.y), vertex_normal(corners.z)) * hit.weights;
     surface.dp_dx = mat3(turn_from_display) * hit.dp_dx;
     surface.dp_dy = mat3(turn_from_display) * hit.dp_dy;
