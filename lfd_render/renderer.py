@@ -24,6 +24,7 @@ from lfd_render.panel.eia import Eia
 from lfd_render.passes.encode import Encode
 from lfd_render.passes.placement import Placement
 from lfd_render.passes.prefilter import Prefilter
+from lfd_render.passes.view_buffers import WINNERS
 from lfd_render.passes.view_target import ViewTarget
 from lfd_render.passes.weave import Weave
 from lfd_render.scene import Environment, Scene
@@ -44,6 +45,8 @@ class RenderOptions:
     """How to render. view_size: upright views of (width, height); None: views that follow the
     lenses, with as many rows as makes all views together as large as the panel. projection: how
     points reach the views, by the shear that parallel views share or by each view's own matrix.
+    splat: how a pixel's nearest point is found, by 64-bit atomics, by two passes of 32-bit ones or
+    by work groups that own their pixels, with the same picture; auto: what suits the device.
     environment: the built-in studio, none, or a picture, turned about the world's +y,
     counter-clockwise seen from above, and scaled."""
 
@@ -57,6 +60,7 @@ class RenderOptions:
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)
     exposure: float = 1.0
     projection: str = "shear"
+    splat: str = "auto"
     environment: str | Environment = "studio"
     environment_turn_rad: float = 0.0
     environment_intensity: float = 1.0
@@ -73,6 +77,7 @@ class RenderOptions:
             raise UsageError(
                 f"projection '{self.projection}': unknown; use {' or '.join(PROJECTIONS)}"
             )
+        self._check_splat()
         if self.views is not None and not 1 <= self.views <= MOST_VIEWS:
             raise UsageError(f"views: {self.views} is out of range; use 1 to {MOST_VIEWS}")
         if self.view_size is not None and not all(1 <= n <= 16384 for n in self.view_size):
@@ -98,6 +103,20 @@ class RenderOptions:
             raise UsageError(
                 f"environment intensity: {self.environment_intensity} is out of range; "
                 f"use a number from 0 to {MOST_RADIANCE:g}"
+            )
+
+    def _check_splat(self) -> None:
+        if self.splat not in WINNERS:
+            raise UsageError(f"splat '{self.splat}': unknown; use {', '.join(WINNERS)}")
+        if self.splat == "owned" and self.projection == "general":
+            raise UsageError(
+                "splat 'owned': needs projection 'shear', whose views share their rows; "
+                "with 'general' use auto"
+            )
+        if self.splat != "auto" and self.technique != "lfdpr":
+            raise UsageError(
+                f"splat '{self.splat}': technique '{self.technique}' does not splat; "
+                "use it with lfdpr"
             )
 
 
@@ -211,6 +230,7 @@ class Renderer:
             "view_grid": grid.kind,
             "triangles": scene.triangle_count,
             "points": frames.technique.count_points(),
+            "splat": frames.technique.winners,
             "renderer": self.device.name,
             "device_bytes": self.device.ledger.peak,
             "warnings": list(buffers.warnings),
@@ -347,6 +367,7 @@ class Renderer:
             target,
             stochastic_culling=choice.preset == "paper",
             general=choice.projection == "general",
+            winners=choice.splat,
         )
 
 

@@ -28,6 +28,15 @@ class Preset(StrEnum):
     PAPER = "paper"
 
 
+class Splat(StrEnum):
+    """How the nearest point of a view pixel is found."""
+
+    AUTO = "auto"
+    INT64 = "int64"
+    TWO_PASS = "two-pass"
+    OWNED = "owned"
+
+
 class Spacing(StrEnum):
     """Rule by which the eyes of the views stand."""
 
@@ -91,6 +100,13 @@ PresetOption = Annotated[
     Preset,
     typer.Option(
         help="default: our best; paper: the paper's upright views and stochastic culling."
+    ),
+]
+SplatOption = Annotated[
+    Splat,
+    typer.Option(
+        help="How lfdpr finds nearest points: 64-bit atomics, two passes of 32-bit ones, or none "
+        "in rows that work groups own. The picture is the same."
     ),
 ]
 CameraOption = Annotated[

@@ -20,7 +20,7 @@ MOST_WINDOW_ITEMS = 1 << 21  # rows of points that one buffer holds: 64 MiB
 _HEADROOM = 1.25  # of a window over the items found, so that a moving scene rarely outgrows it
 _SPAN_GROUP = 128  # local_size_x of sample/span.comp
 _SEGMENT_GROUP = 64  # local_size_x of sample/sum.comp and sample/compact.comp
-_ROWS_DISPATCH = 12  # byte offset of rows_x within Work
+ROWS_DISPATCH = 12  # byte offset of rows_x within Work
 
 
 @dataclass
@@ -186,7 +186,7 @@ class Sample:
             },
             {"window": window},
         )
-        self._rows.run_indirect(points.work, window * dtype("Work").itemsize + _ROWS_DISPATCH)
+        self._rows.run_indirect(points.work, window * dtype("Work").itemsize + ROWS_DISPATCH)
 
     def count(self, batch: Batch, points: PointCloud, band: Band) -> int:
         """Points of one batch and band. Samples, counts and waits: not for a frame."""
@@ -206,7 +206,7 @@ class Sample:
                 },
                 {"window": window},
             )
-            self._count.run_indirect(points.work, window * dtype("Work").itemsize + _ROWS_DISPATCH)
+            self._count.run_indirect(points.work, window * dtype("Work").itemsize + ROWS_DISPATCH)
         return int(self._total.read(np.uint32)[0])
 
     def release(self) -> None:

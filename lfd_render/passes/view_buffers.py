@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from lfd_render.errors import GpuError
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.layout import CONSTANTS
 from lfd_render.gpu.memory import Buffer
@@ -15,8 +16,26 @@ from lfd_render.passes.sample import GROUPS_ACROSS
 from lfd_render.passes.view_target import ViewTarget
 
 INT64_ATOMICS = "GL_NV_shader_atomic_int64"
+WINNERS = ("auto", "int64", "two-pass", "owned")  # ways to find them, all with the same result
 _FARTHEST = 0x7F800000  # +∞ as a float's bits
 _GROUP = 64  # local_size_x of splat/forget.comp
+
+
+def choose_winners(device: Device, wanted: str) -> str:
+    """What a member of WINNERS comes to on a device: int64, two-pass or owned.
+
+    Raises GpuError for 64-bit atomics where there are none.
+    """
+    assert wanted in WINNERS
+    has_int64 = INT64_ATOMICS in device.info.extensions
+    if wanted == "int64" and not has_int64:
+        raise GpuError(
+            f"splat 'int64': {device.name} lacks {INT64_ATOMICS}; use two-pass, owned or auto, "
+            "which give the same picture"
+        )
+    if wanted == "auto":
+        return "int64" if has_int64 else "two-pass"
+    return wanted
 
 
 class ViewBuffers(Protocol):

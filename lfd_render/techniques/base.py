@@ -14,6 +14,11 @@ class Technique(Protocol):
 
     target: ViewTarget
 
+    @property
+    def winners(self) -> str | None:
+        """How points' winners are found; None where nothing is splatted."""
+        ...
+
     def begin(self, placement: Placement, clock: StageClock) -> None:
         """Start a frame: place the scene."""
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
+from lfd_render.passes.owned import OwnedSplat
 from lfd_render.passes.placement import Placement
 from lfd_render.passes.sample import PointCloud, Sample
 from lfd_render.passes.shade import Shade
 from lfd_render.passes.splat import Splat, view_lanes
 from lfd_render.passes.transform import Transform
-from lfd_render.passes.view_buffers import INT64_ATOMICS, make_view_buffers
+from lfd_render.passes.view_buffers import choose_winners, make_view_buffers
 from lfd_render.passes.view_target import Band, ViewTarget
 
 
@@ -28,14 +29,16 @@ class Lfdpr:
         *,
         stochastic_culling: bool = False,
         general: bool = False,
-        int64: bool | None = None,
+        winners: str = "auto",
     ) -> None:
         """general: splat by each view's matrix instead of the shear that parallel views share.
 
-        int64: find winners by 64-bit atomics; None does where the device has them.
+        winners: how they are found, of WINNERS; owned needs the shear. Raises GpuError where the
+        device cannot.
         """
-        if int64 is None:
-            int64 = INT64_ATOMICS in device.info.extensions
+        self.winners = choose_winners(device, winners)
+        int64, owned = self.winners == "int64", self.winners == "owned"
+        assert not (owned and general)
         lanes = view_lanes(target.rig.views)
         self.target = target
         self._scene = scene
@@ -43,7 +46,11 @@ class Lfdpr:
         self._sample = Sample(
             device, scene, lanes, stochastic_culling=stochastic_culling, whole_rows=general
         )
-        self._splat = Splat(device, scene, target, general=general, int64=int64)
+        self._splat = (
+            OwnedSplat(device, scene, target)
+            if owned
+            else Splat(device, scene, target, general=general, int64=int64)
+        )
         self._views = make_view_buffers(device, target, int64=int64)
         self._shade = Shade(device, scene, target, self._views.word_stride)
         self._points = [self._sample.allocate(batch) for batch in scene.batches]
@@ -63,6 +70,14 @@ class Lfdpr:
             for batch, points in self._batches():
                 self._sample(batch, points, band)
         self.complete()
+        if isinstance(self._splat, OwnedSplat):  # bins are whole now that the windows are
+            for band in self.target.bands:
+                for batch, points in self._batches():
+                    self._sample(batch, points, band)
+                    for window in range(points.windows):
+                        self._sample.rows(batch, points, band, window)
+                        self._splat.bin(batch, points, window=window, band=band)
+            self.complete()
 
     def render(self, band: Band, clock: StageClock) -> None:
         """Sample, splat and shade one band of rows."""
@@ -95,8 +110,8 @@ class Lfdpr:
                     self._splat(step, batch, points, window=window, band=band, views=self._views)
 
     def complete(self) -> bool:
-        """Whether the windows held all points since the last call; if not, they do from now on."""
-        enlarged = [self._sample.fit(points) for points in self._points]
+        """Whether there was room for all points since the last call; if not, there is now."""
+        enlarged = [self._sample.fit(points) for points in self._points] + [self._splat.fit()]
         return not any(enlarged)
 
     def count_points(self) -> int:

@@ -14,6 +14,8 @@ from lfd_render.passes.view_target import Band, ViewTarget
 class Mvr:
     """transform → raster, once a view."""
 
+    winners = None
+
     def __init__(self, device: Device, scene: SceneBuffers, target: ViewTarget) -> None:
         self.target = target
         self._scene = scene

@@ -4,4 +4,4 @@
 layout(local_size_x = VIEW_LANES) in;
 
 #include "splat/visit.glsl"
-#include "splat/shear.glsl"
+#include "splat/groups.glsl"

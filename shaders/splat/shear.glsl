@@ -1,9 +1,7 @@
-// Splat points into all views by the shear identity. A work group takes GROUP_ROWS (4) rows of points
-// and a lane is a view: what a row's points cover there, cut to the triangle (the inside-triangle test
-// of Gavane and Watson 2023, section 3.3), is an interval of columns whose ends move linearly with the
-// eye. llvmpipe loads once for all lanes where the index is the group's and no loop, branch or return
-// has come before, twenty times as fast as lane by lane; hence the order in main.
-// In: PointRows, Work, Eyes (columns); the batch where alpha counts. Out: Depths or Words.
+// Splat a row of points into a view by the shear identity: what its points cover there, cut to the
+// triangle (the inside-triangle test of Gavane and Watson 2023, section 3.3), is an interval of columns
+// whose ends move linearly with the eye.
+// In: PointRows, Work, Eyes (columns); the batch where alpha counts. Out: what visit() writes.
 
 #include "common/triangles.glsl"
 #include "common/points.glsl"
@@ -37,17 +35,4 @@ void splat_row(PointRow points, bool real, int view, float eye) {
         precise float k = points.a_depth_k + (float(column) + 0.5 - a) * k_per_column;
         visit(line + uint(column), frame.distance_mm / clamp(k, k_farthest, k_nearest), id);
     }
-}
-
-void main() {
-    uint first = (gl_WorkGroupID.y * GROUPS_ACROSS + gl_WorkGroupID.x) * GROUP_ROWS;
-    PointRow row_0 = point_rows[first], row_1 = point_rows[first + 1u];
-    PointRow row_2 = point_rows[first + 2u], row_3 = point_rows[first + 3u];
-    uint items = work[window].items;
-    int view = int(gl_WorkGroupID.z * VIEW_LANES + gl_LocalInvocationID.x);
-    float eye = eyes[min(view, frame.views - 1)];
-    splat_row(row_0, first < items, view, eye);
-    splat_row(row_1, first + 1u < items, view, eye);
-    splat_row(row_2, first + 2u < items, view, eye);
-    splat_row(row_3, first + 3u < items, view, eye);
 }

@@ -44,6 +44,7 @@ def test_options_reach_the_renderer(
         "view_size": (30, 20),
         "technique": "mvr",
         "preset": "paper",
+        "splat": "auto",
         "spacing": "angle",
         "seed": 9,
         "repeat": 3,

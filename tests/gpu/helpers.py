@@ -17,13 +17,14 @@ from lfd_render.gpu.layout import dtype
 from lfd_render.gpu.lighting import EnvironmentMap
 from lfd_render.gpu.memory import TextureArray
 from lfd_render.gpu.scene_buffers import SceneBuffers
+from lfd_render.passes.owned import OwnedSplat
 from lfd_render.passes.placement import Placement
 from lfd_render.passes.prefilter import Prefilter
 from lfd_render.passes.sample import Sample
 from lfd_render.passes.shade import Shade
 from lfd_render.passes.splat import Splat, view_lanes
 from lfd_render.passes.transform import Transform
-from lfd_render.passes.view_buffers import INT64_ATOMICS, make_view_buffers
+from lfd_render.passes.view_buffers import choose_winners, make_view_buffers
 from lfd_render.passes.view_target import Band, ViewTarget
 from lfd_render.reference import Triangles, placed
 from lfd_render.scene import Environment, Image, Instance, Material, Mesh, Scene, TextureSlot
@@ -243,6 +244,7 @@ class Passes:
         display_from_world: NDArray[np.float64] | None = None,
         *,
         general: bool = False,
+        winners: str = "auto",
         stochastic_culling: bool = False,
         background: tuple[float, float, float] = (0.0, 0.0, 0.0),
         seed: int = 0,
@@ -267,8 +269,13 @@ class Passes:
             stochastic_culling=stochastic_culling,
             whole_rows=general,
         )
-        self.int64 = INT64_ATOMICS in device.info.extensions
-        self.splat = Splat(device, self.buffers, self.target, general=general, int64=self.int64)
+        chosen = choose_winners(device, winners)
+        self.int64 = chosen == "int64"
+        self.splat = (
+            OwnedSplat(device, self.buffers, self.target)
+            if chosen == "owned"
+            else Splat(device, self.buffers, self.target, general=general, int64=self.int64)
+        )
         self.views = make_view_buffers(device, self.target, int64=self.int64)
         self.shade = Shade(device, self.buffers, self.target, self.views.word_stride)
         self.points = [self.sample.allocate(batch) for batch in self.buffers.batches]
@@ -282,6 +289,14 @@ class Passes:
             for band in self.target.bands:
                 self.sample(batch, points, band)
             self.sample.fit(points)
+        if isinstance(self.splat, OwnedSplat):
+            for band in self.target.bands:
+                for batch, points in self.batches:
+                    self.sample(batch, points, band)
+                    for window in range(points.windows):
+                        self.sample.rows(batch, points, band, window)
+                        self.splat.bin(batch, points, window=window, band=band)
+            self.splat.fit()
 
     @property
     def batches(self) -> list[tuple]:

@@ -288,6 +288,7 @@ def divided(
     band_rows: int | None = None,
     window_items: int | None = None,
     batch_triangles: int | None = None,
+    winners: str = "auto",
 ) -> Winners:
     """Winners with limits lowered until the work falls into parts."""
     with pytest.MonkeyPatch.context() as patch:
@@ -297,7 +298,7 @@ def divided(
             patch.setattr(sample, "MOST_WINDOW_ITEMS", window_items)
         if batch_triangles:
             patch.setattr(scene_buffers, "BATCH_TRIANGLES", batch_triangles)
-        with passes(device, scene, rig, grid) as opened_passes:
+        with passes(device, scene, rig, grid, winners=winners) as opened_passes:
             if band_rows:
                 assert len(opened_passes.target.bands) > 1
             if window_items:

@@ -1,0 +1,105 @@
+"""Splatting without atomics: a work group owns a row of the band and a block of views."""
+
+from __future__ import annotations
+
+import math
+
+from lfd_render.gpu.device import Device
+from lfd_render.gpu.programs import Kernel
+from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
+from lfd_render.passes.bin import Bin
+from lfd_render.passes.sample import PointCloud
+from lfd_render.passes.splat import view_lanes
+from lfd_render.passes.view_buffers import ViewBuffers
+from lfd_render.passes.view_target import Band, ViewTarget
+
+MOST_ITERATIONS = 65535  # llvmpipe ends an invocation's loops here, nested ones counted together
+
+
+class OwnedSplat:
+    """PointCloud, ViewTarget → SplitViewBuffers, with the bits that `Splat` finds by atomics."""
+
+    steps = range(1)
+
+    def __init__(self, device: Device, scene: SceneBuffers, target: ViewTarget) -> None:
+        self._scene = scene
+        self._bin = Bin(device, scene, target)
+        self._lanes = view_lanes(target.rig.views)
+        constants = scene.constants()
+        # A column of a tested row also looks for its texture's array.
+        column_loops = {False: 1, True: 1 + int(constants["SRGB_GROUPS"])}
+        tested = {batch.alpha_mode != "opaque" for batch in scene.batches}
+        self._bin_items = {
+            key: max(1, MOST_ITERATIONS // (target.grid.columns * column_loops[key] + 2))
+            for key in tested
+        }
+        self._kernels = {
+            key: Kernel(
+                device,
+                "splat/owned.comp",
+                {
+                    **constants,
+                    "VIEW_LANES": self._lanes,
+                    "BIN_ITEMS": self._bin_items[key],
+                    "ALPHA_TESTED": int(key),
+                },
+            )
+            for key in sorted(tested)
+        }
+
+    def __call__(
+        self,
+        step: int,
+        batch: Batch,
+        points: PointCloud,
+        *,
+        window: int,
+        band: Band,
+        views: ViewBuffers,
+    ) -> None:
+        """Splat one window of points, as much of each bin as `fit` has made room for."""
+        assert step in self.steps
+        self.bin(batch, points, window=window, band=band)
+        tested = batch.alpha_mode != "opaque"
+        kernel = self._kernels[tested]
+        buffers = {
+            **batch.geometry(),
+            **batch.attributes(),
+            **self._scene.materials_of(),
+            **views.blocks(),
+            "Draws": self._scene.draws,
+            "FrameBlock": band.frame(batch),
+            "PointRows": self._bin.rows,
+            "WorkBlock": points.work,
+            "Bins": self._bin.ends,
+            "Eyes": band.target.eyes,
+            "RowOffsets": band.target.row_offsets,
+        }
+        groups = band.rows, -(-band.target.rig.views // self._lanes), 1
+        stride = coprime_stride(band.rows)
+        for taken in range(0, self._bin.room(batch), self._bin_items[tested]):
+            uniforms = {"window": window, "taken": taken, "row_stride": stride}
+            kernel.set(buffers, uniforms, self._scene.samplers())
+            kernel.run(groups)
+
+    def bin(self, batch: Batch, points: PointCloud, *, window: int, band: Band) -> None:
+        """Sort one window of points by row, from which `fit` learns how long bins are."""
+        self._bin(batch, points, band, window)
+
+    def fit(self) -> bool:
+        """Make room for the longest bins; whether what was splatted must be splatted again."""
+        return self._bin.fit()
+
+    def release(self) -> None:
+        """Free the kernels."""
+        self._bin.release()
+        for kernel in self._kernels.values():
+            kernel.release()
+
+
+def coprime_stride(count: int) -> int:
+    """A step, near the golden section of `count`, that visits all of 0…count − 1 once modulo it."""
+    stride = max(1, round(0.618 * count))
+    while math.gcd(stride, count) > 1:
+        stride += 1
+    return stride
