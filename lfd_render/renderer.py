@@ -78,10 +78,17 @@ class RenderOptions:
                 f"projection '{self.projection}': unknown; use {' or '.join(PROJECTIONS)}"
             )
         self._check_splat()
-        if self.views is not None and not 1 <= self.views <= MOST_VIEWS:
-            raise UsageError(f"views: {self.views} is out of range; use 1 to {MOST_VIEWS}")
-        if self.view_size is not None and not all(1 <= n <= 16384 for n in self.view_size):
-            raise UsageError(f"view size: {self.view_size} is out of range; use 1 to 16384 a side")
+        if self.views is not None and not _whole(self.views, MOST_VIEWS):
+            raise UsageError(f"views: {self.views!r} is out of range; use 1 to {MOST_VIEWS}")
+        size = self.view_size
+        if size is not None and not (
+            isinstance(size, tuple | list)
+            and len(size) == 2
+            and all(_whole(n, 16384) for n in size)
+        ):
+            raise UsageError(
+                f"view size: {size!r} is out of range; use two whole numbers, 1 to 16384 a side"
+            )
         if len(self.background) != 3 or not all(0 <= c <= MOST_RADIANCE for c in self.background):
             raise UsageError(
                 f"background: {self.background}; use three numbers from 0 to {MOST_RADIANCE:g}"
@@ -118,6 +125,10 @@ class RenderOptions:
                 f"splat '{self.splat}': technique '{self.technique}' does not splat; "
                 "use it with lfdpr"
             )
+
+
+def _whole(value: object, most: int) -> bool:
+    return isinstance(value, int | np.integer) and 1 <= int(value) <= most
 
 
 @dataclass
@@ -196,6 +207,7 @@ class Renderer:
         it. views: number of views, the profile's by default. options: those of RenderOptions.
         Raises SceneError, UsageError, ResourceError or GpuError.
         """
+        _check_kinds(scene, display, camera)
         choice = RenderOptions(views=views, **options)
         with self._call():
             return self._render(scene, display, camera or camera_for(scene, display), choice)
@@ -264,6 +276,7 @@ class Renderer:
         rig: eyes other than the display's own, for example `Rig.single(display, angle)`. The view
         size is by default one column a lens and the default rows. Otherwise as `render`.
         """
+        _check_kinds(scene, display, camera)
         choice = RenderOptions(views=views, **options)
         rig = rig or display.rig(choice.views, choice.spacing)
         with self._call():
@@ -443,6 +456,18 @@ def _grid(display: DisplayProfile, choice: RenderOptions, views: int) -> ViewGri
     if choice.preset == "paper":
         return ViewGrid.upright(display, *upright_size(display, views))
     return (ViewGrid.sheared if choice.technique == "mvr" else ViewGrid.lens)(display, rows)
+
+
+def _check_kinds(scene: object, display: object, camera: object) -> None:
+    """Raise UsageError for what is not an object of the right class, such as a file's name."""
+    wanted = {
+        "scene": (scene, Scene, "Scene"),
+        "display": (display, DisplayProfile, "DisplayProfile"),
+        "camera": (camera, Camera | None, "Camera"),
+    }
+    for argument, (value, kind, name) in wanted.items():
+        if not isinstance(value, kind):
+            raise UsageError(f"{argument}: {value!r}; give a {name}, as {name}.load(…) makes")
 
 
 def _check_size(grid: ViewGrid, views: int) -> None:

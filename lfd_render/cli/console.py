@@ -5,7 +5,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from lfd_render.errors import OutputError
@@ -15,8 +15,9 @@ _STARTED = time.perf_counter()
 
 
 def say(message: str) -> None:
-    """One line to the person, on stderr."""
-    print(message, file=sys.stderr, flush=True)
+    """One line to the person, on stderr, if anyone listens."""
+    with suppress(OSError):
+        print(message, file=sys.stderr, flush=True)
 
 
 def warn(message: str) -> None:

@@ -20,12 +20,19 @@ def load_display(name_or_path: str) -> DisplayProfile:
     from lfd_render.display import DisplayProfile  # noqa: PLC0415 (keeps --help quick)
 
     profile = DisplayProfile.load(name_or_path)
-    if profile.template:
-        warn(
-            f"display '{profile.name}': its figures are a model's or assumed; "
-            "a real unit needs its own calibration"
-        )
+    for warning in display_warnings(profile):
+        warn(warning)
     return profile
+
+
+def display_warnings(profile: DisplayProfile) -> list[str]:
+    """What a person should know of a display."""
+    if not profile.template:
+        return []
+    return [
+        f"display '{profile.name}': its figures are a model's or assumed; "
+        "a real unit needs its own calibration"
+    ]
 
 
 def load_scene(source: str) -> Scene:

@@ -10,7 +10,7 @@ import typer
 
 from lfd_render.cli import options
 from lfd_render.cli.console import Stopwatch, print_json, progress, say, warn
-from lfd_render.cli.inputs import load_display
+from lfd_render.cli.inputs import display_warnings, load_display
 from lfd_render.cli.outputs import check_picture_output, write_picture
 from lfd_render.errors import PictureError
 
@@ -61,6 +61,7 @@ def look(
                 "display": profile.name,
                 "angle_deg": angle,
                 "view_size": [width, height],
+                "warnings": display_warnings(profile),
                 "timings_ms": watch.finish(),
             }
         )

@@ -58,6 +58,7 @@ def _program(
 def main() -> int:
     """Run the command line of this process; its exit code."""
     signal.signal(signal.SIGTERM, _end)
+    _replace_closed()
     try:
         code = app(prog_name=PROGRAM, standalone_mode=False)
         sys.stdout.flush()
@@ -71,6 +72,15 @@ def main() -> int:
         if code == EXIT_INTERRUPTED:
             say_error("interrupted")
     return int(code or 0)
+
+
+def _replace_closed() -> None:
+    """Put something in the place of streams that were closed before the program started: a stdout
+    that cannot be written, so that asking for it is an error, and a stderr that nobody reads."""
+    if sys.stdout is None:
+        sys.stdout = os.fdopen(os.open(os.devnull, os.O_RDONLY), "w")
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (for the process)
 
 
 def _end(number: int, _frame: object) -> None:

@@ -4,7 +4,8 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from lfd_render.cli.console import writing_stdout
@@ -39,6 +40,8 @@ def check_folder_output(output: str) -> Path:
 
     Raises OutputError. Nothing is made yet, so that a failure leaves nothing behind.
     """
+    if output == STDOUT:
+        raise UsageError("-o -: the result is several files; give a folder")
     folder = Path(output)
     if folder.exists() and not folder.is_dir():
         raise OutputError(f"{output}: is a file; give a folder")
@@ -52,6 +55,34 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(exist_ok=True)
     except OSError as error:
         raise OutputError(f"{folder}: {error.strerror}; choose another folder") from error
+
+
+@contextmanager
+def filling(folder: Path) -> Iterator[Path]:
+    """Give a temporary folder whose files all move into `folder` in the end, or none on failure.
+
+    Makes `folder` if it is not there, and removes it again on failure. Raises OutputError.
+    """
+    made = not folder.exists()
+    make_folder(folder)
+    try:
+        with tempfile.TemporaryDirectory(prefix=".lfd-render-", dir=folder) as name:
+            yield Path(name)
+            for file in sorted(Path(name).iterdir()):
+                os.replace(file, folder / file.name)
+    except BaseException as error:
+        if made:
+            _remove_empty(folder)
+        if isinstance(error, OSError):
+            raise OutputError(f"{folder}: {error.strerror}; choose another folder") from error
+        raise
+
+
+def _remove_empty(folder: Path) -> None:
+    try:
+        folder.rmdir()
+    except OSError:
+        return  # someone else has put something there
 
 
 def write_picture(output: str, save: Callable[[Path], object]) -> None:

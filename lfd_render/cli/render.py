@@ -6,7 +6,13 @@ import typer
 
 from lfd_render.cli import options
 from lfd_render.cli.console import Stopwatch, print_json, progress, say, warn
-from lfd_render.cli.inputs import load_display, load_light, load_scene, place_camera
+from lfd_render.cli.inputs import (
+    display_warnings,
+    load_display,
+    load_light,
+    load_scene,
+    place_camera,
+)
 from lfd_render.cli.outputs import check_picture_output, write_picture
 
 
@@ -90,7 +96,8 @@ def render(
     watch.timings_ms = {"load": load_ms, **eia.report["timings_ms"], "encode": encode_ms}
     if json:
         result = {"output": output, "display": profile.name, "seed": seed, "repeat": repeat}
-        print_json(result | eia.report | {"timings_ms": watch.finish()})
+        warnings = [*display_warnings(profile), *eia.report["warnings"]]
+        print_json(result | eia.report | {"warnings": warnings, "timings_ms": watch.finish()})
     height, width = eia.pixels.shape[:2]
     say(
         f"{output}: {width} × {height}, {eia.report['views']} views by {technique.value}, "

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from lfd_render.cli import options
-from lfd_render.cli.console import Stopwatch, print_json, progress, say
-from lfd_render.cli.inputs import load_display, load_light, load_scene, place_camera
-from lfd_render.cli.outputs import check_folder_output, make_folder
+from lfd_render.cli.console import Stopwatch, print_json, progress, say, warn
+from lfd_render.cli.inputs import (
+    display_warnings,
+    load_display,
+    load_light,
+    load_scene,
+    place_camera,
+)
+from lfd_render.cli.outputs import check_folder_output, filling
+
+_VIEW_NAME = re.compile(r"view_\d{3,}\.png")
 
 if TYPE_CHECKING:
     import numpy as np
@@ -88,7 +97,6 @@ def views(
             **light,
         )
     with watch.span("encode"), progress("Writing"):
-        make_folder(folder)
         files = _write(folder, pictures)
 
     if json:
@@ -102,6 +110,7 @@ def views(
                 "view_size": [pictures.shape[2], pictures.shape[1]],
                 "seed": seed,
                 "camera": window.to_json_dict(),
+                "warnings": [*display_warnings(profile), *loaded.warnings],
                 "timings_ms": watch.finish(),
             }
         )
@@ -109,10 +118,20 @@ def views(
 
 
 def _write(folder: Path, pictures: NDArray[np.uint8]) -> list[Path]:
-    """Write uint8 [view, y, x, 3] as view_000.png and so on; the files in view order."""
+    """Write uint8 [view, y, x, 3] as view_000.png and so on; the files in view order.
+
+    All appear or none, in the place of all views of an earlier run.
+    """
     from lfd_render.panel.picture import write_png  # noqa: PLC0415 (keeps --help quick)
 
-    files = [folder / f"view_{index:03d}.png" for index in range(len(pictures))]
-    for file, pixels in zip(files, pictures, strict=True):
-        write_png(file, pixels)
-    return files
+    names = [f"view_{index:03d}.png" for index in range(len(pictures))]
+    with filling(folder) as temporary:
+        for name, pixels in zip(names, pictures, strict=True):
+            write_png(temporary / name, pixels)
+    views_there = [file for file in folder.iterdir() if _VIEW_NAME.fullmatch(file.name)]
+    older = [file for file in views_there if file.name not in names]
+    for file in older:
+        file.unlink(missing_ok=True)
+    if older:
+        warn(f"{folder}: {len(older)} views of an earlier run, with more views, are removed")
+    return [folder / name for name in names]

@@ -61,8 +61,9 @@ class _VisualJson(StrictModel, extra="ignore"):
 
 
 def is_visual_json(data: object) -> bool:
-    """Whether parsed JSON is a vendor calibration and not a profile file."""
-    return isinstance(data, dict) and "schema" not in data and {"pitch", "slope"} <= data.keys()
+    """Whether parsed JSON is a vendor calibration, maybe an incomplete one, and no profile file."""
+    named = {"pitch", "slope", "center", "viewCone", "DPI", "screenW", "screenH"}
+    return isinstance(data, dict) and "schema" not in data and len(named & data.keys()) >= 2
 
 
 def profile_data(text: str, source: str) -> dict[str, Any]:

@@ -25,6 +25,9 @@ class StrictModel(BaseModel):
 def read_json_text(path: Path, error: type[LfdError]) -> str:
     """Text of a JSON file of at most 4 MB; raises `error` with one line naming the file."""
     try:
+        # Asking first keeps pipes, which may never be written, from being opened.
+        if path.exists() and not path.is_file() and not path.is_dir():
+            raise error(f"{path}: is not a regular file; give the path of a JSON file")
         with path.open("rb") as file:
             data = file.read(MAX_JSON_BYTES + 1)
     except OSError as cause:

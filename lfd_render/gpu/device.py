@@ -6,6 +6,7 @@ only one that talks to moderngl; passes see `Device`, `Kernel`, `RasterProgram`,
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -60,6 +61,7 @@ class Device:
         self.owned: dict[Owned, None] = {}  # in the order they were made
         self.info = _describe(self.context, self.raw, egl_index)
         self.closed = False
+        self._thread = threading.get_ident()
         if self.info.max_storage_blocks < STORAGE_BLOCKS:
             raise GpuError(
                 f"device {self.name}: a compute shader may use {self.info.max_storage_blocks} "
@@ -100,6 +102,10 @@ class Device:
         """Make this the thread's current context. Whoever has several calls it before each use."""
         if self.closed:
             raise GpuError("device: it is closed; open another Device or Renderer")
+        if threading.get_ident() != self._thread:
+            raise GpuError(
+                "device: it belongs to the thread that opened it; open a Renderer in each thread"
+            )
         self.context.__enter__()  # type: ignore[no-untyped-call]  # moderngl types its methods only
 
     def finish(self) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.display import DisplayProfile, ViewGrid, slot_from_angle
+from lfd_render.display.model import MAX_VIEWS
 from lfd_render.errors import PictureError, UsageError
 
 Pixels = NDArray[np.uint8]
@@ -44,8 +45,8 @@ def look(
             f"uint8 [{height}, {width}, 3]"
         )
     count = profile.views if views is None else views
-    if count < 1:
-        raise UsageError(f"views is {count}; it should be at least 1")
+    if not 1 <= count <= MAX_VIEWS:
+        raise UsageError(f"views is {count}; it should be from 1 to {MAX_VIEWS}")
     grid = ViewGrid.lens(profile, ViewGrid.default_rows(profile, count))
     columns = max(1, round(grid.rows * profile.size_mm[0] / profile.size_mm[1]))
     out_columns, out_rows = size_px or (columns, grid.rows)

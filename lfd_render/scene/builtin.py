@@ -47,9 +47,13 @@ def load_builtin(source: str) -> Scene:
         raise SceneError(f"builtin: '{name}'; give one of {', '.join(sorted(BUILTINS))}")
     builtin = BUILTINS[name]
     options = dict(builtin.defaults)
+    given: set[str] = set()
     for key, text in _query_items(query):
         if key not in builtin.ranges:
             raise SceneError(f"option: '{key}'; {name} takes {', '.join(sorted(builtin.ranges))}")
+        if key in given:
+            raise SceneError(f"option: '{key}' is given twice; give it once")
+        given.add(key)
         options[key] = _whole_number(key, text, *builtin.ranges[key])
     return builtin.make(**options)
 

@@ -1,6 +1,7 @@
 """The renderer as a guest of its process: memory, errors, closing, numbers that make no picture."""
 
 import dataclasses
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -36,6 +37,45 @@ def test_closing_twice_is_once(spheres: Scene, display: DisplayProfile) -> None:
         renderer.close()
     with pytest.raises(GpuError, match="closed"):
         renderer.views(spheres, display, **SMALL)
+
+
+def test_another_thread_is_told_whose_device_it_is(spheres: Scene, display: DisplayProfile) -> None:
+    def elsewhere() -> None:
+        for use in (renderer.views, renderer.render):
+            with pytest.raises(GpuError, match="belongs to the thread that opened it"):
+                use(spheres, display, **SMALL)
+
+    with Renderer() as renderer:
+        expected = renderer.views(spheres, display, **SMALL)
+        with ThreadPoolExecutor(1) as pool:
+            pool.submit(elsewhere).result()
+        np.testing.assert_array_equal(renderer.views(spheres, display, **SMALL), expected)
+
+
+@pytest.mark.parametrize("method", ["render", "views"])
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"scene": "helmet.gltf"}, "scene: 'helmet.gltf'; give a Scene, as Scene.load"),
+        ({"display": "profile.json"}, "display: 'profile.json'; give a DisplayProfile"),
+        ({"camera": "front"}, "camera: 'front'; give a Camera"),
+        ({"view_size": "4x4"}, "view size: '4x4' is out of range; use two whole numbers"),
+        ({"view_size": (4, 4, 4)}, "view size"),
+        ({"view_size": (4.5, 4)}, "view size"),
+        ({"views": "8"}, "views: '8' is out of range"),
+    ],
+)
+def test_arguments_of_the_wrong_kind_are_named(
+    device: Device,
+    spheres: Scene,
+    display: DisplayProfile,
+    method: str,
+    wrong: dict[str, object],
+    message: str,
+) -> None:
+    arguments = {"scene": spheres, "display": display, **SMALL, **wrong}
+    with pytest.raises(UsageError, match=f"^{message}"):
+        getattr(Renderer(device), method)(**arguments)
 
 
 @pytest.mark.parametrize("technique", ["lfdpr", "mvr"])

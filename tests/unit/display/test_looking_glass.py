@@ -86,6 +86,8 @@ def test_cells_are_read_as_they_stand(key: str) -> None:
     ("changes", "message"),
     [
         ({"DPI": ...}, "DPI is missing"),
+        ({"pitch": ...}, "pitch is missing"),
+        ({"pitch": ..., "slope": ..., "DPI": ...}, "pitch is missing.* \\(and 2 more\\)"),
         ({"pitch": {"value": "52"}}, "pitch is '52'"),
         ({"pitch": {"value": -52.0}}, "pitch is -52.0; it should be greater than 0"),
         ({"center": {"value": math.nan}}, "center is nan"),
