@@ -21,10 +21,12 @@ _FARTHEST = 0x7F800000  # +∞ as a float's bits
 _GROUP = 64  # local_size_x of splat/forget.comp
 
 
-def choose_winners(device: Device, wanted: str) -> str:
+def choose_winners(device: Device, wanted: str, *, general: bool = False) -> str:
     """What a member of WINNERS comes to on a device: int64, two-pass or owned.
 
-    Raises GpuError for 64-bit atomics where there are none.
+    auto: 64-bit atomics where there are some; else owned rows on software devices, where they take
+    0.4 to 0.6 of two passes' time (docs/performance.md); else two passes. general: views do not
+    share rows, so none can be owned. Raises GpuError for 64-bit atomics where there are none.
     """
     assert wanted in WINNERS
     has_int64 = INT64_ATOMICS in device.info.extensions
@@ -33,9 +35,11 @@ def choose_winners(device: Device, wanted: str) -> str:
             f"splat 'int64': {device.name} lacks {INT64_ATOMICS}; use two-pass, owned or auto, "
             "which give the same picture"
         )
-    if wanted == "auto":
-        return "int64" if has_int64 else "two-pass"
-    return wanted
+    if wanted != "auto":
+        return wanted
+    if has_int64:
+        return "int64"
+    return "owned" if device.info.software and not general else "two-pass"
 
 
 class ViewBuffers(Protocol):

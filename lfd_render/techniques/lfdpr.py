@@ -36,7 +36,7 @@ class Lfdpr:
         winners: how they are found, of WINNERS; owned needs the shear. Raises GpuError where the
         device cannot.
         """
-        self.winners = choose_winners(device, winners)
+        self.winners = choose_winners(device, winners, general=general)
         int64, owned = self.winners == "int64", self.winners == "owned"
         assert not (owned and general)
         lanes = view_lanes(target.rig.views)

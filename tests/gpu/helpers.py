@@ -269,7 +269,7 @@ class Passes:
             stochastic_culling=stochastic_culling,
             whole_rows=general,
         )
-        chosen = choose_winners(device, winners)
+        chosen = choose_winners(device, winners, general=general)
         self.int64 = chosen == "int64"
         self.splat = (
             OwnedSplat(device, self.buffers, self.target)

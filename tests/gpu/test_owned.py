@@ -4,6 +4,9 @@
 points in any order, and bins that outgrow their room are this path's own.
 """
 
+import dataclasses
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -177,6 +180,23 @@ def test_pictures_are_the_same(device: Device) -> None:
 def test_strides_visit_every_row(count: int) -> None:
     visited = np.arange(count) * owned.coprime_stride(count) % count
     assert sorted(visited) == list(range(count))
+
+
+def test_what_suits_the_device_is_chosen(device: Device) -> None:
+    for int64 in (False, True):
+        for software in (False, True):
+            info = dataclasses.replace(
+                device.info,
+                software=software,
+                extensions=frozenset({INT64_ATOMICS} if int64 else ()),
+            )
+            other = SimpleNamespace(info=info, name="other")
+            expected = "int64" if int64 else "owned" if software else "two-pass"
+            assert choose_winners(other, "auto") == expected
+            assert choose_winners(other, "auto", general=True) == expected.replace(
+                "owned", "two-pass"
+            )
+            assert choose_winners(other, "two-pass") == "two-pass"
 
 
 def test_a_device_without_64_bit_atomics_says_so(device: Device) -> None:
