@@ -334,7 +334,8 @@ def test_the_command_line_warns_and_renders(
     )  # fmt: skip
     out, err = capsys.readouterr()
     assert code == 0
-    warnings = json.loads(out)["warnings"]
+    of_display, *warnings = json.loads(out)["warnings"]
+    assert of_display.startswith("display 'gavane-2024-tilted-4k': its figures")
     assert len(warnings) == 2
     assert re.search(NO_AREA, warnings[0])
     assert re.search(NO_UV_AREA, warnings[1])
