@@ -6,6 +6,7 @@ The device is zink on lavapipe, whose OpenGL has NV_shader_atomic_int64, in a pr
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -90,3 +91,16 @@ def test_both_splat_paths_give_the_same_bits(zink: dict[str, str]) -> None:
         ]  # what the device offers is used, and can be refused
         assert found["visible"] > 1000
         assert found["different words"] == found["different images"] == 0
+
+
+@pytest.mark.needs("zink")
+def test_owned_rows_give_the_same_bits_on_random_scenes(zink: dict[str, str]) -> None:
+    module = Path(__file__).with_name("test_owned.py")
+    tests = [
+        f"{module}::test_{name}"
+        for name in ("winners_are_those_of_atomics", "a_dispatch_left_out_is_seen")
+    ]
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests]
+    done = subprocess.run(command, env=zink, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert "2 passed" in done.stdout
