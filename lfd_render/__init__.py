@@ -8,17 +8,27 @@ if TYPE_CHECKING:
     from lfd_render.panel.eia import Eia
     from lfd_render.panel.look import look
     from lfd_render.renderer import Renderer
-    from lfd_render.scene import Scene
+    from lfd_render.scene import Environment, Scene
 
 __version__ = "0.1.0"
 
-__all__ = ["Camera", "DisplayProfile", "Eia", "Renderer", "Scene", "__version__", "look"]
+__all__ = [
+    "Camera",
+    "DisplayProfile",
+    "Eia",
+    "Environment",
+    "Renderer",
+    "Scene",
+    "__version__",
+    "look",
+]
 
 # Loaded when first used, so that the command line answers --help without numpy or OpenGL.
 _HOMES = {
     "Camera": "lfd_render.display",
     "DisplayProfile": "lfd_render.display",
     "Eia": "lfd_render.panel.eia",
+    "Environment": "lfd_render.scene",
     "Renderer": "lfd_render.renderer",
     "Scene": "lfd_render.scene",
     "look": "lfd_render.panel.look",

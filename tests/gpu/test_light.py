@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from lfd_render.display import Camera, DisplayProfile, Rig, ViewGrid
 from lfd_render.gpu import raw as gl
 from lfd_render.gpu.device import Device
 from lfd_render.reference import Visibility, studio
+from lfd_render.reference import lights as reference_lights
 from lfd_render.reference.environment import Adjusted, Darkness, Panorama
 from lfd_render.reference.environment import Environment as ReferenceEnvironment
 from lfd_render.reference.pipeline import shade_over
@@ -26,6 +28,7 @@ pytestmark = pytest.mark.needs("gl")
 
 Float64 = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
+_cone = reference_lights.cone
 HALF = 2.0**-10  # a step of half floats, relative: llvmpipe cuts, others round
 
 
@@ -124,6 +127,26 @@ def test_as_many_lights_as_there_may_be(device: Device, rng: np.random.Generator
     lights = tuple(random_light(rng) for _ in range(256))
     scene = wall(Material("lit", metallic=0.0, roughness=0.5), lights)
     assert off(*difference(device, scene)) < LIGHT_TOLERANCE
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        ("window", lambda light, distance: 1.0 / distance),
+        ("window", lambda light, distance: 1.0 / distance**2),  # without the range
+        ("cone", lambda light, cosine: np.sqrt(_cone(light, cosine))),
+        ("cone", lambda light, cosine: _cone(light, -cosine)),
+    ],
+)
+def test_wrong_lights_are_caught(
+    device: Device, monkeypatch: pytest.MonkeyPatch, name: str, fault: Callable[..., Float64]
+) -> None:
+    lamp = lamp_at(10, 0, 60, 4000.0, 90.0).world_from_light
+    spot = Light("spot", "spot", lamp, (1.0, 0.8, 0.6), 4000.0, 90.0, 0.1, 0.9)
+    scene = wall(Material("lit", metallic=0.0, roughness=0.5), (spot,))
+    assert off(*difference(device, scene)) < LIGHT_TOLERANCE
+    monkeypatch.setattr(reference_lights, name, fault)
+    assert off(*difference(device, scene)) > 10 * LIGHT_TOLERANCE
 
 
 def test_lights_put_out_the_key_light_and_leave_the_studio(device: Device) -> None:
