@@ -18,6 +18,7 @@ from lfd_render.display.model import Spacing
 from lfd_render.errors import ResourceError, SceneError, UsageError
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
+from lfd_render.gpu.layout import LOD_RULES
 from lfd_render.gpu.lighting import EnvironmentMap
 from lfd_render.gpu.scene_buffers import SceneBuffers
 from lfd_render.panel.eia import Eia
@@ -48,7 +49,8 @@ class RenderOptions:
     splat: how a pixel's nearest point is found, by 64-bit atomics, by two passes of 32-bit ones or
     by work groups that own their pixels, with the same picture; auto: what suits the device.
     environment: the built-in studio, none, or a picture, turned about the world's +y,
-    counter-clockwise seen from above, and scaled."""
+    counter-clockwise seen from above, and scaled.
+    lod: how textures are filtered, one of LOD_RULES; None: as the preset has it (`lod_rule`)."""
 
     views: int | None = None
     view_size: tuple[int, int] | None = None
@@ -64,19 +66,21 @@ class RenderOptions:
     environment: str | Environment = "studio"
     environment_turn_rad: float = 0.0
     environment_intensity: float = 1.0
+    lod: str | None = None
 
     def __post_init__(self) -> None:
         """Check ranges; raises UsageError."""
-        if self.technique not in TECHNIQUES:
-            raise UsageError(
-                f"technique '{self.technique}': unknown; use {' or '.join(TECHNIQUES)}"
-            )
-        if self.preset not in PRESETS:
-            raise UsageError(f"preset '{self.preset}': unknown; use {' or '.join(PRESETS)}")
-        if self.projection not in PROJECTIONS:
-            raise UsageError(
-                f"projection '{self.projection}': unknown; use {' or '.join(PROJECTIONS)}"
-            )
+        for name, choice, choices in (
+            ("technique", self.technique, TECHNIQUES),
+            ("preset", self.preset, PRESETS),
+            ("projection", self.projection, PROJECTIONS),
+            ("lod", self.lod_rule, LOD_RULES),
+        ):
+            if choice not in choices:
+                raise UsageError(f"{name} '{choice}': unknown; use {' or '.join(choices)}")
+        if self.lod == "multiview" and self.technique == "mvr":
+            others = " or ".join(rule for rule in LOD_RULES if rule != "multiview")
+            raise UsageError(f"lod 'multiview': mvr has no points that views share; use {others}")
         self._check_splat()
         if self.views is not None and not _whole(self.views, MOST_VIEWS):
             raise UsageError(f"views: {self.views!r} is out of range; use 1 to {MOST_VIEWS}")
@@ -111,6 +115,16 @@ class RenderOptions:
                 f"environment intensity: {self.environment_intensity} is out of range; "
                 f"use a number from 0 to {MOST_RADIANCE:g}"
             )
+
+    @property
+    def lod_rule(self) -> str:
+        """The rule of LOD_RULES in use: the preset's where none is given. The paper filters LFDPR's
+        textures by multiview mipmapping (section 3.3) and those of MVR as hardware does."""
+        if self.lod is not None:
+            return self.lod
+        if self.preset == "paper":
+            return "long-axis" if self.technique == "mvr" else "multiview"
+        return "anisotropic"
 
     def _check_splat(self) -> None:
         if self.splat not in WINNERS:
@@ -237,6 +251,7 @@ class Renderer:
         report = {
             "technique": choice.technique,
             "preset": choice.preset,
+            "lod": choice.lod_rule,
             "views": rig.views,
             "view_size": [grid.columns, grid.rows],
             "view_grid": grid.kind,
@@ -373,7 +388,7 @@ class Renderer:
     ) -> Technique:
         target = ViewTarget(self.device, rig, grid, buffers.batches, choice.seed)
         if choice.technique == "mvr":
-            return Mvr(self.device, buffers, target)
+            return Mvr(self.device, buffers, target, lod=choice.lod_rule)
         return Lfdpr(
             self.device,
             buffers,
@@ -381,6 +396,7 @@ class Renderer:
             stochastic_culling=choice.preset == "paper",
             general=choice.projection == "general",
             winners=choice.splat,
+            lod=choice.lod_rule,
         )
 
 

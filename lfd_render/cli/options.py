@@ -37,6 +37,16 @@ class Splat(StrEnum):
     OWNED = "owned"
 
 
+class Lod(StrEnum):
+    """Rule by which textures are filtered."""
+
+    NONE = "none"
+    AREA = "area"
+    LONG_AXIS = "long-axis"
+    MULTIVIEW = "multiview"
+    ANISOTROPIC = "anisotropic"
+
+
 class Spacing(StrEnum):
     """Rule by which the eyes of the views stand."""
 
@@ -155,6 +165,10 @@ EnvironmentTurnOption = Annotated[
 ]
 EnvironmentIntensityOption = Annotated[
     float, typer.Option(metavar="F", help="Scale the environment's light.")
+]
+LodOption = Annotated[
+    Lod | None,
+    typer.Option(help="How textures are filtered; else as the preset has it."),
 ]
 SeedOption = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Seed of all random choices.")]
 DeviceOption = Annotated[

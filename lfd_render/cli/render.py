@@ -37,6 +37,7 @@ def render(
     environment_turn: options.EnvironmentTurnOption = 0.0,
     environment_intensity: options.EnvironmentIntensityOption = 1.0,
     exposure: options.ExposureOption = None,
+    lod: options.LodOption = None,
     seed: options.SeedOption = 0,
     repeat: Annotated[
         int, typer.Option(min=1, help="Render N frames with a moving camera; time their median.")
@@ -82,6 +83,7 @@ def render(
             preset=preset.value,
             splat=splat.value,
             spacing=spacing.value if spacing else None,
+            lod=lod.value if lod else None,
             seed=seed,
             repeat=repeat,
             **light,

@@ -52,6 +52,7 @@ def views(
     environment_turn: options.EnvironmentTurnOption = 0.0,
     environment_intensity: options.EnvironmentIntensityOption = 1.0,
     exposure: options.ExposureOption = None,
+    lod: options.LodOption = None,
     seed: options.SeedOption = 0,
     device: options.DeviceOption = "auto",
     json: options.JsonOption = False,
@@ -93,6 +94,7 @@ def views(
             technique=technique.value,
             preset=preset.value,
             spacing=spacing.value if spacing else None,
+            lod=lod.value if lod else None,
             seed=seed,
             **light,
         )

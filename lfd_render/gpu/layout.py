@@ -24,6 +24,9 @@ _TYPES: dict[str, tuple[str, int, int]] = {
 # Texture slot of a material, glTF 2.0 section 3.9.2.
 TEXTURE_ROLES = ("base_color", "metallic_roughness", "normal", "occlusion", "emissive")
 
+# How a texture is filtered over a view pixel's footprint (shaders/common/textures.glsl).
+LOD_RULES = ("none", "area", "long-axis", "multiview", "anisotropic")
+
 STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
     # One mesh placed in the world. Normals go by the inverse transpose, kept as three columns.
     "Draw": (
@@ -152,7 +155,14 @@ CONSTANTS: dict[str, int] = {
     "SLOT_GROUP_BITS": 8,
     "SLOT_LAYER_BITS": 16,
     "NO_TEXTURE": 0xFFFFFFFF,
+    **{f"LOD_{rule.upper().replace('-', '_')}": n for n, rule in enumerate(LOD_RULES)},
+    "MOST_TAPS": 16,  # of an anisotropic fetch
 }
+
+
+def lod_constants(rule: str) -> dict[str, int]:
+    """The macro that chooses a rule of LOD_RULES in shaders that fetch textures."""
+    return {"LOD_RULE": LOD_RULES.index(rule)}
 
 
 @cache

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from lfd_render.gpu.device import Device
+from lfd_render.gpu.layout import lod_constants
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.bin import Bin
@@ -21,13 +22,16 @@ class OwnedSplat:
 
     steps = range(1)
 
-    def __init__(self, device: Device, scene: SceneBuffers, target: ViewTarget) -> None:
+    def __init__(
+        self, device: Device, scene: SceneBuffers, target: ViewTarget, *, lod: str = "area"
+    ) -> None:
+        """lod: one of LOD_RULES, for alpha."""
         self._scene = scene
         self._bin = Bin(device, scene, target)
         self._lanes = view_lanes(target.rig.views)
-        constants = scene.constants()
-        # A column of a tested row also looks for its texture's array.
-        column_loops = {False: 1, True: 1 + int(constants["SRGB_GROUPS"])}
+        constants = {**scene.constants(), **lod_constants(lod)}
+        # A column of a tested row also looks for its texture's array, twice, and takes one tap.
+        column_loops = {False: 1, True: 2 + 2 * int(constants["SRGB_GROUPS"])}
         tested = {batch.alpha_mode != "opaque" for batch in scene.batches}
         self._bin_items = {
             key: max(1, MOST_ITERATIONS // (target.grid.columns * column_loops[key] + 2))

@@ -15,6 +15,7 @@ from lfd_render.gpu.framebuffer import (
     face_culling,
     rasterising,
 )
+from lfd_render.gpu.layout import lod_constants
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import RasterProgram, Samplers, Uniform
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
@@ -31,7 +32,11 @@ class RasterForward:
     triangles all blend there, where the other techniques keep one.
     """
 
-    def __init__(self, device: Device, scene: SceneBuffers, target: ViewTarget) -> None:
+    def __init__(
+        self, device: Device, scene: SceneBuffers, target: ViewTarget, *, lod: str = "area"
+    ) -> None:
+        """lod: one of LOD_RULES, without the one that needs points."""
+        assert lod != "multiview"
         self._device = device
         self._scene = scene
         self._target = target
@@ -46,6 +51,7 @@ class RasterForward:
                     "BLENDED": int(alpha_mode == "blend"),
                     **scene.constants(),
                     **scene.lighting.constants(),
+                    **lod_constants(lod),
                 },
             )
             for alpha_mode in sorted({batch.alpha_mode for batch in scene.batches})

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lfd_render.gpu.device import Device
-from lfd_render.gpu.layout import dtype
+from lfd_render.gpu.layout import dtype, lod_constants
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
@@ -26,8 +26,15 @@ class Shade:
     meets the triangle that its word names. `blend` lays the nearest blended surface over it."""
 
     def __init__(
-        self, device: Device, scene: SceneBuffers, target: ViewTarget, word_stride: int
+        self,
+        device: Device,
+        scene: SceneBuffers,
+        target: ViewTarget,
+        word_stride: int,
+        *,
+        lod: str = "area",
     ) -> None:
+        """lod: one of LOD_RULES."""
         constants = {
             "BLOCK": BLOCK,
             "GROUP_BLOCKS": GROUP_BLOCKS,
@@ -35,6 +42,7 @@ class Shade:
             "GROUPS_ACROSS": GROUPS_ACROSS,
             **scene.constants(),
             **scene.lighting.constants(),
+            **lod_constants(lod),
         }
         self._scene = scene
         self._list = Kernel(device, "shade/blocks.comp", constants)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lfd_render.display import Rig, ViewGrid
 from lfd_render.gpu.device import Device
-from lfd_render.gpu.layout import dtype
+from lfd_render.gpu.layout import dtype, lod_constants
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
@@ -36,8 +36,12 @@ class Splat:
         *,
         general: bool = False,
         int64: bool = False,
+        lod: str = "area",
     ) -> None:
-        """general: by each view's matrix instead of the shear that parallel views share."""
+        """general: by each view's matrix instead of the shear that parallel views share.
+
+        lod: one of LOD_RULES, for alpha.
+        """
         self.steps = range(1 if int64 else 2)
         path = f"splat/{'general' if general else 'shear'}{'_int64' if int64 else ''}.comp"
         constants = {
@@ -45,6 +49,7 @@ class Splat:
             "GROUP_ROWS": GROUP_ROWS,
             "GROUPS_ACROSS": GROUPS_ACROSS,
             **scene.constants(),
+            **lod_constants(lod),
         }
         self._scene = scene
         self._projection: dict[str, Buffer] = {}

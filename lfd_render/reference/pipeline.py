@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lfd_render.display import Camera, DisplayProfile, Rig, ViewGrid
 from lfd_render.reference.encode import encoded
 from lfd_render.reference.raster import Visibility, visible
-from lfd_render.reference.shade import Shading, opaque_at, points_at
+from lfd_render.reference.shade import Shading, opaque_at, points_at, seen_by_all
 from lfd_render.reference.transform import placed
 from lfd_render.reference.weave import woven
 from lfd_render.scene import Scene
@@ -36,13 +36,17 @@ def render_views(
     display_from_world: Float64,
     *,
     background: Color = BLACK,
+    lod: str = "area",
 ) -> Views:
     """All views of a scene. display_from_world: float64 [4, 4], as `Camera.display_from_world`.
+
+    lod: the rule by which textures are filtered, as `textures.filtered` has it.
 
     Of blended surfaces the nearest lies over what is solid; those behind it do not show.
     """
     triangles = placed(scene, display_from_world)
-    shading = Shading(scene, triangles, np.linalg.inv(display_from_world).astype(np.float64))
+    inverse = np.linalg.inv(display_from_world).astype(np.float64)
+    shading = Shading(scene, triangles, inverse, lod=lod)
     accepts = opaque_at(shading, rig, grid)
     solid = visible(triangles, rig, grid, accepts)
     blended = visible(triangles, rig, grid, accepts, over=solid)
@@ -59,6 +63,8 @@ def shade_over(
     """Lay what pixels show over view images [view, row, column, rgb], in place."""
     pixels, ids = shown.shown()
     points = points_at(shading.triangles, rig, grid, ids, pixels)
+    if shading.lod == "multiview":
+        points = seen_by_all(points, shading, rig, grid, pixels.view)
     colors = shading.colors(points, rig.eye_x_mm[pixels.view], rig.distance_mm)
     opacity = np.where(shading.triangles.blended[ids], shading.alpha(points), 1.0)[:, None]
     at = (pixels.view, pixels.row, pixels.column)
@@ -74,11 +80,12 @@ def render_eia(
     grid: ViewGrid | None = None,
     background: Color = BLACK,
     exposure: float = 1.0,
+    lod: str = "area",
 ) -> NDArray[np.uint8]:
     """The panel image, uint8 [y, x, rgb]; by default with the profile's views along its lenses."""
     rig = profile.rig() if rig is None else rig
     if grid is None:
         grid = ViewGrid.lens(profile, ViewGrid.default_rows(profile, rig.views))
     display_from_world = camera.display_from_world(profile.size_mm)
-    views = render_views(scene, rig, grid, display_from_world, background=background)
+    views = render_views(scene, rig, grid, display_from_world, background=background, lod=lod)
     return encoded(woven(views.linear, profile, grid), exposure)

@@ -9,7 +9,7 @@ of a corner is α/(α + β + γ), and its derivative follows by the quotient rul
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,8 +19,9 @@ from lfd_render.display import Rig, ViewGrid
 from lfd_render.reference import studio
 from lfd_render.reference.environment import Environment
 from lfd_render.reference.lights import Arrival, arriving
+from lfd_render.reference.points import densest_pixel_mm2, point_columns
 from lfd_render.reference.raster import Accepts, Pixels, faces, meet, rays
-from lfd_render.reference.textures import area_lod, mip_chain, sampled
+from lfd_render.reference.textures import Footprints, among_views, filtered, mip_chain
 from lfd_render.reference.transform import Triangles, points_by, unit
 from lfd_render.scene import Material, Scene
 
@@ -45,6 +46,7 @@ class Points:
     p_display_dx: Float64
     p_display_dy: Float64
     back: Bool  # seen from behind
+    views: Float64  # [pixel, 3], see Footprints
 
     def blend(self, at_corners: Float64) -> Float64:
         """Values of the pixels' own corners [pixel, corner, …], at the pixels."""
@@ -67,11 +69,62 @@ def points_at(triangles: Triangles, rig: Rig, grid: ViewGrid, ids: Int, pixels: 
         np.einsum("nc,ncx->nx", w, corners) for w in (weights, weights_dx, weights_dy)
     )
     back = ~faces(meeting.whole, triangles.mirrored[ids], double_sided=False)
-    return Points(ids, weights, weights_dx, weights_dy, p_display, p_dx, p_dy, back)
+    alone = np.tile([1.0, 1.0, 0.0], (len(ids), 1))
+    return Points(ids, weights, weights_dx, weights_dy, p_display, p_dx, p_dy, back, alone)
+
+
+def seen_by_all(points: Points, shading: Shading, rig: Rig, grid: ViewGrid, view: Int) -> Points:
+    """Points [pixel] with what their footprints are in all views; view: each pixel's own."""
+    triangles, scene = shading.triangles, shading.scene
+    areas = np.stack(
+        [pixel_areas_mm2(points, triangles, rig, grid, eye) for eye in rig.eye_x_mm], axis=1
+    )
+    own = areas[np.arange(len(view)), view]
+    splat = np.empty(len(view))
+    for index in np.unique(points.ids).tolist():
+        corners = triangles.p_display[index]
+        at = points.ids == index
+        # One point's cell: so many pixels of the eye that sees the plane densest.
+        depth = rig.distance_mm - points.p_display[at, 2]
+        nearest = max(rig.near_mm, rig.distance_mm - corners[:, 2].max())
+        pixel = densest_pixel_mm2(corners, rig, grid) * (depth / nearest) ** 3
+        splat[at] = pixel * point_columns(scene, triangles, index, rig, grid)
+    drawn = np.stack([_drawn(points, triangles, rig, eye) for eye in rig.eye_x_mm], axis=1)
+    views = among_views(np.where(drawn, areas, np.nan), own, splat)
+    return replace(points, views=views)
+
+
+def pixel_areas_mm2(
+    points: Points, triangles: Triangles, rig: Rig, grid: ViewGrid, eye_mm: float
+) -> Float64:
+    """What a pixel of an eye covers around points [pixel] on their triangles' planes, mm²: two
+    steps on the window, carried to the plane."""
+    corners = triangles.p_display[points.ids]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    ray = points.p_display - (eye_mm, 0.0, rig.distance_mm)
+    t = -ray[:, 2:] / rig.distance_mm
+    steps = []
+    for step in ((grid.column_mm, 0.0, 0.0), (0.0, -grid.panel_mm[1] / grid.rows, 0.0)):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            along = (normal @ step / _dot(normal, ray))[:, None]
+            steps.append(np.asarray(t * (np.array(step) - ray * along), np.float64))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.linalg.norm(np.cross(steps[0], steps[1]), axis=-1))
+
+
+def _drawn(points: Points, triangles: Triangles, rig: Rig, eye_mm: float) -> Bool:
+    """Whether an eye sees a side that is drawn of the triangles of points."""
+    corners = triangles.p_display[points.ids]
+    from_eye = corners - (eye_mm, 0.0, rig.distance_mm)
+    whole = _dot(from_eye[:, 0], np.cross(from_eye[:, 1], from_eye[:, 2]))
+    ids = points.ids
+    return faces(whole, triangles.mirrored[ids], triangles.double_sided[ids])
 
 
 class Shading:
-    """Materials of a scene, ready to colour points. Mip chains are made once an image."""
+    """Materials of a scene, ready to colour points. Mip chains are made once an image.
+
+    lod: the rule by which textures are filtered, as `filtered` has it."""
 
     def __init__(
         self,
@@ -79,11 +132,14 @@ class Shading:
         triangles: Triangles,
         world_from_display: Float64,
         environment: Environment = studio,
+        *,
+        lod: str = "area",
     ) -> None:
         self.scene = scene
         self.triangles = triangles
         self.world_from_display = world_from_display
         self.environment = environment
+        self.lod = lod
         self._chains: dict[tuple[int, bool], list[Float64]] = {}
 
     def colors(self, points: Points, eyes_mm: Float64, distance_mm: float) -> Float64:
@@ -100,13 +156,21 @@ class Shading:
             colors[chosen] = surface.radiance(eye_world[chosen])
         return colors
 
-    def alpha(self, points: Points) -> Float64:
-        """Opacity [pixel]: base colour, its texture and the vertices' colours."""
+    def coverage(self, points: Points) -> Float64:
+        """Alpha [pixel] that decides whether points count: filtered by one tap and for one view,
+        so by `area` where the rule takes more."""
+        rule = "area" if self.lod in ("multiview", "anisotropic") else self.lod
+        return self.alpha(points, rule)
+
+    def alpha(self, points: Points, lod: str | None = None) -> Float64:
+        """Opacity [pixel]: base colour, its texture and the vertices' colours; lod: another rule
+        than the scene's."""
         alpha = np.zeros(len(points.ids))
         for index in np.unique(self.triangles.material[points.ids]):
             chosen = self.triangles.material[points.ids] == index
             part = Points(**{name: field[chosen] for name, field in vars(points).items()})
-            alpha[chosen] = Surface(self, self.scene.materials[index], part).base_color[:, 3]
+            surface = Surface(self, self.scene.materials[index], part, lod)
+            alpha[chosen] = surface.base_color[:, 3]
         return alpha
 
     def chain(self, image: int, *, srgb: bool) -> list[Float64]:
@@ -120,7 +184,10 @@ class Shading:
 class Surface:
     """Points on one material."""
 
-    def __init__(self, shading: Shading, material: Material, points: Points) -> None:
+    def __init__(
+        self, shading: Shading, material: Material, points: Points, lod: str | None = None
+    ) -> None:
+        self._lod = lod or shading.lod
         self._shading = shading
         self._material = material
         self._points = points
@@ -130,10 +197,9 @@ class Surface:
         slot = getattr(self._material, role)
         if slot is None:
             return None
-        uv, uv_dx, uv_dy = self.texcoord(role)
+        at = Footprints(*self.texcoord(role), self._points.views)
         chain = self._shading.chain(slot.image, srgb=role in SRGB_ROLES)
-        height, width = chain[0].shape[:2]
-        return sampled(chain, uv, area_lod(uv_dx, uv_dy, (width, height)), slot.wrap)
+        return filtered(chain, at, slot.wrap, self._lod)
 
     def texcoord(self, role: str) -> tuple[Float64, Float64, Float64]:
         """A slot's texture coordinate [pixel, uv] and its change over a column and a row.
@@ -326,7 +392,7 @@ def opaque_at(shading: Shading, rig: Rig, grid: ViewGrid) -> Accepts:
             return np.ones(len(pixels.row), bool)
         ids = np.full(len(pixels.row), index)
         points = points_at(shading.triangles, rig, grid, ids, pixels)
-        return shading.alpha(points) >= cutoff
+        return shading.coverage(points) >= cutoff
 
     return accepts
 

@@ -30,11 +30,14 @@ class Lfdpr:
         stochastic_culling: bool = False,
         general: bool = False,
         winners: str = "auto",
+        lod: str = "area",
     ) -> None:
         """general: splat by each view's matrix instead of the shear that parallel views share.
 
         winners: how they are found, of WINNERS; owned needs the shear. Raises GpuError where the
         device cannot.
+
+        lod: how textures are filtered, one of LOD_RULES.
         """
         self.winners = choose_winners(device, winners, general=general)
         int64, owned = self.winners == "int64", self.winners == "owned"
@@ -47,12 +50,12 @@ class Lfdpr:
             device, scene, lanes, stochastic_culling=stochastic_culling, whole_rows=general
         )
         self._splat = (
-            OwnedSplat(device, scene, target)
+            OwnedSplat(device, scene, target, lod=lod)
             if owned
-            else Splat(device, scene, target, general=general, int64=int64)
+            else Splat(device, scene, target, general=general, int64=int64, lod=lod)
         )
         self._views = make_view_buffers(device, target, int64=int64)
-        self._shade = Shade(device, scene, target, self._views.word_stride)
+        self._shade = Shade(device, scene, target, self._views.word_stride, lod=lod)
         self._points = [self._sample.allocate(batch) for batch in scene.batches]
 
     def begin(self, placement: Placement, clock: StageClock) -> None:

@@ -16,11 +16,14 @@ class Mvr:
 
     winners = None
 
-    def __init__(self, device: Device, scene: SceneBuffers, target: ViewTarget) -> None:
+    def __init__(
+        self, device: Device, scene: SceneBuffers, target: ViewTarget, *, lod: str = "area"
+    ) -> None:
+        """lod: one of LOD_RULES, without `multiview`."""
         self.target = target
         self._scene = scene
         self._transform = Transform(device)
-        self._raster = RasterForward(device, scene, target)
+        self._raster = RasterForward(device, scene, target, lod=lod)
 
     def begin(self, placement: Placement, clock: StageClock) -> None:
         """Place the scene and transform its vertices."""

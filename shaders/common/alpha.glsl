@@ -23,9 +23,9 @@ bool alpha_accepts(uint triangle, float eye, int row, int column) {
     if (slot != NO_TEXTURE) {
         mat3x2 uv0 = mat3x2(tex_coords[corners.x], tex_coords[corners.y], tex_coords[corners.z]);
         mat3x2 uv1 = mat3x2(vertex_uv1(corners.x), vertex_uv1(corners.y), vertex_uv1(corners.z));
-        Footprint f0 = Footprint(uv0 * hit.weights, uv0 * hit.weights_dx, uv0 * hit.weights_dy);
-        Footprint f1 = Footprint(uv1 * hit.weights, uv1 * hit.weights_dx, uv1 * hit.weights_dy);
-        alpha *= sample_srgb(slot, slot_footprint(material, BASE_COLOR, f0, f1)).a;
+        Footprint f0 = Footprint(uv0 * hit.weights, uv0 * hit.weights_dx, uv0 * hit.weights_dy, ONE_VIEW);
+        Footprint f1 = Footprint(uv1 * hit.weights, uv1 * hit.weights_dx, uv1 * hit.weights_dy, ONE_VIEW);
+        alpha *= sample_srgb(slot, slot_footprint(material, BASE_COLOR, f0, f1), ALPHA_RULE).a;
     }
     return alpha >= alpha_cutoff(material);
 }

@@ -59,11 +59,11 @@ vec3 specular_brdf(vec3 f0, float alpha, float n_dot_l, float n_dot_v, float n_d
 }
 
 // Base colour with its texture and the vertices' colours, linear, alpha included.
-vec4 base_color_of(Surface surface) {
+vec4 base_color_of(Surface surface, int rule) {
     vec4 color = material_base_color(surface.material) * surface.color;
     uint slot = slot_of(surface.material, BASE_COLOR);
     if (slot != NO_TEXTURE)
-        color *= sample_srgb(slot, slot_footprint(surface.material, BASE_COLOR, surface.uv0, surface.uv1));
+        color *= sample_srgb(slot, slot_footprint(surface.material, BASE_COLOR, surface.uv0, surface.uv1), rule);
     return color;
 }
 
@@ -88,7 +88,7 @@ vec3 emitted(Surface surface) {
     vec3 radiance = vec3(unpackHalf2x16(material.emissive_rg), unpackHalf2x16(material.emissive_b_cutoff).x);
     uint slot = slot_of(surface.material, EMISSIVE);
     if (slot != NO_TEXTURE)
-        radiance *= sample_srgb(slot, slot_footprint(surface.material, EMISSIVE, surface.uv0, surface.uv1)).rgb;
+        radiance *= sample_srgb(slot, slot_footprint(surface.material, EMISSIVE, surface.uv0, surface.uv1), LOD_RULE).rgb;
     return radiance;
 }
 
@@ -108,7 +108,7 @@ vec3 reflectance(Facet facet, vec3 to_light, float n_dot_l) {
 
 // Radiance towards the eye and opacity.
 vec4 shade(Surface surface) {
-    vec4 base_color_alpha = base_color_of(surface);
+    vec4 base_color_alpha = base_color_of(surface, LOD_RULE);
     vec3 base_color = base_color_alpha.rgb;
     if ((materials[surface.material].flags & UNLIT) != 0u) return base_color_alpha;
     vec3 orm = occlusion_roughness_metallic(surface);

@@ -23,13 +23,16 @@ void main() {
     surface.normal = normal_world;
     surface.dp_dx = turn * dFdx(p_display);
     surface.dp_dy = turn * dFdy(p_display);
-    surface.uv0 = Footprint(uv01.xy, dFdx(uv01.xy), dFdy(uv01.xy));
-    surface.uv1 = Footprint(uv01.zw, dFdx(uv01.zw), dFdy(uv01.zw));
+    surface.uv0 = Footprint(uv01.xy, dFdx(uv01.xy), dFdy(uv01.xy), ONE_VIEW);
+    surface.uv1 = Footprint(uv01.zw, dFdx(uv01.zw), dFdy(uv01.zw), ONE_VIEW);
     surface.color = color;
     surface.material = material;
     surface.back = !gl_FrontFacing;
 
     radiance = shade(surface);
-    if (ALPHA_TESTED != 0 && radiance.a < alpha_cutoff(material)) discard;
+    if (ALPHA_TESTED != 0) {
+        float alpha = ALPHA_RULE == LOD_RULE ? radiance.a : base_color_of(surface, ALPHA_RULE).a;
+        if (alpha < alpha_cutoff(material)) discard;
+    }
     if (BLENDED == 0) radiance.a = 1.0;
 }

@@ -15,6 +15,8 @@ layout(std430) readonly restrict buffer BlockWorkBlock { BlockWork block_work; }
 layout(std430) readonly restrict buffer Eyes { float eyes[]; };
 layout(std430) readonly restrict buffer RowOffsets { float row_offsets[]; };
 
+#include "common/multiview.glsl"
+
 uniform mat4 turn_from_display;  // see Placement
 uniform uint row_blocks;
 
@@ -50,6 +52,7 @@ Surface surface_at(uint triangle, int view, int row, int column) {
     mat3x2 uv0 = mat3x2(tex_coords[corners.x], tex_coords[corners.y], tex_coords[corners.z]);
     mat3x2 uv1 = mat3x2(vertex_uv1(corners.x), vertex_uv1(corners.y), vertex_uv1(corners.z));
     uint facing = draws[corners.w].facing;
+    vec3 views = LOD_RULE == LOD_MULTIVIEW ? footprint_views(corners, plane, eye_mm, facing) : ONE_VIEW;
 
     Surface surface;
     surface.to_eye = mat3(turn_from_display) * (vec3(eye_mm, 0.0, frame.distance_mm) - hit.p_display);
@@ -57,8 +60,8 @@ Surface surface_at(uint triangle, int view, int row, int column) {
     surface.normal = mat3(vertex_normal(corners.x), vertex_normal(corners.y), vertex_normal(corners.z)) * hit.weights;
     surface.dp_dx = mat3(turn_from_display) * hit.dp_dx;
     surface.dp_dy = mat3(turn_from_display) * hit.dp_dy;
-    surface.uv0 = Footprint(uv0 * hit.weights, uv0 * hit.weights_dx, uv0 * hit.weights_dy);
-    surface.uv1 = Footprint(uv1 * hit.weights, uv1 * hit.weights_dx, uv1 * hit.weights_dy);
+    surface.uv0 = Footprint(uv0 * hit.weights, uv0 * hit.weights_dx, uv0 * hit.weights_dy, views);
+    surface.uv1 = Footprint(uv1 * hit.weights, uv1 * hit.weights_dx, uv1 * hit.weights_dy, views);
     surface.color = mat3x4(vertex_color(corners.x), vertex_color(corners.y), vertex_color(corners.z)) * hit.weights;
     surface.material = draws[corners.w].material;
     surface.back = (eye_side(plane, eye_mm) < 0.0) != ((facing & FACING_MIRRORED) != 0u);

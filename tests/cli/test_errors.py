@@ -73,6 +73,7 @@ def test_debug_shows_the_traceback(
         (("render", "x.glb", "-o", "a.png", "--technique", "magic"), "magic"),
         (("render", "x.glb", "-o", "a.png", "--preset", "best"), "best"),
         (("render", "x.glb", "-o", "a.png", "--spacing", "even"), "even"),
+        (("render", "x.glb", "-o", "a.png", "--lod", "trilinear"), "trilinear"),
         (("render", "x.glb", "-o", "a.png", "--seed", "-1"), "--seed"),
         (("render", "x.glb", "-o", "a.png", "--repeat", "0"), "--repeat"),
         (("render", "x.glb", "-o", "a.png", "--device", "cuda"), "cuda"),

@@ -27,7 +27,7 @@ def test_options_reach_the_renderer(
     result = command(
         "render", scene, "-o", out, "--display", display, "--views", 5, "--view-size", "30x20",
         "--technique", "mvr", "--preset", "paper", "--yaw", 90, "--depth-scale", 0.5, "--seed", 9,
-        "--repeat", 3, "--device", "software", "--spacing", "angle",
+        "--repeat", 3, "--device", "software", "--spacing", "angle", "--lod", "long-axis",
     )  # fmt: skip
     assert result.code == 0
     assert result.stdout == ""
@@ -46,6 +46,7 @@ def test_options_reach_the_renderer(
         "preset": "paper",
         "splat": "auto",
         "spacing": "angle",
+        "lod": "long-axis",
         "seed": 9,
         "repeat": 3,
         "environment": "studio",

@@ -251,6 +251,7 @@ class Passes:
         environment: str | Environment = "studio",
         turn_rad: float = 0.0,
         intensity: float = 1.0,
+        lod: str = "area",
     ) -> None:
         self.scene, self.rig, self.grid = scene, rig, grid
         self.display_from_world = np.eye(4) if display_from_world is None else display_from_world
@@ -272,12 +273,14 @@ class Passes:
         chosen = choose_winners(device, winners, general=general)
         self.int64 = chosen == "int64"
         self.splat = (
-            OwnedSplat(device, self.buffers, self.target)
+            OwnedSplat(device, self.buffers, self.target, lod=lod)
             if chosen == "owned"
-            else Splat(device, self.buffers, self.target, general=general, int64=self.int64)
+            else Splat(
+                device, self.buffers, self.target, general=general, int64=self.int64, lod=lod
+            )
         )
         self.views = make_view_buffers(device, self.target, int64=self.int64)
-        self.shade = Shade(device, self.buffers, self.target, self.views.word_stride)
+        self.shade = Shade(device, self.buffers, self.target, self.views.word_stride, lod=lod)
         self.points = [self.sample.allocate(batch) for batch in self.buffers.batches]
         self.buffers.place(self.display_from_world)
         for batch in self.buffers.batches:

@@ -203,7 +203,7 @@ def _coverage(
     cutoff = cutoff_of(shading.scene.materials[int(triangles.material[index])])
     if cutoff > 0.0:
         with np.errstate(all="ignore"):
-            alpha = shading.alpha(points_at(triangles, rig, grid, ids, pixels))
+            alpha = shading.coverage(points_at(triangles, rig, grid, ids, pixels))
         certainly &= alpha >= cutoff + ALPHA_TOLERANCE
         possibly &= alpha >= cutoff - ALPHA_TOLERANCE
     return certainly, possibly, depths, band_mm

@@ -33,14 +33,16 @@ def likeness(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> tuple[float, int]:
     return float((off > 3).mean()), int(np.max(off[off <= 3]))
 
 
-@pytest.mark.parametrize("upright", [False, True])
-def test_panel_images_are_alike(device: Device, rng: np.random.Generator, upright: bool) -> None:
+@pytest.mark.parametrize(("upright", "lod"), [(False, "anisotropic"), (True, "multiview")])
+def test_panel_images_are_alike(
+    device: Device, rng: np.random.Generator, upright: bool, lod: str
+) -> None:
     display = small_display()
     scene = random_scene(rng, display, 30)
     camera = millimetre_camera(display.size_mm, depth_scale=0.9).turned(0.1)
     size = (40, 30) if upright else None
     grid = ViewGrid.upright(display, *size) if size else None
-    options = {"background": (0.1, 0.2, 0.3), "exposure": 0.8}
+    options = {"background": (0.1, 0.2, 0.3), "exposure": 0.8, "lod": lod}
     with Renderer(device) as renderer:
         found = renderer.render(scene, display, camera, view_size=size, **options).pixels
     expected = render_eia(scene, display, camera, grid=grid, **options)

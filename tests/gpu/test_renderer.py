@@ -161,6 +161,8 @@ def test_a_buffer_is_released_once(device: Device) -> None:
         ({"views": 1025}, UsageError),
         ({"technique": "magic"}, UsageError),
         ({"preset": "fast"}, UsageError),
+        ({"lod": "trilinear"}, UsageError),
+        ({"lod": "multiview", "technique": "mvr"}, UsageError),
         ({"projection": "fisheye"}, UsageError),
         ({"splat": "luck"}, UsageError),
         ({"splat": "owned", "projection": "general"}, UsageError),

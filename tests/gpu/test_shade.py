@@ -54,7 +54,8 @@ class Case:
         """Images of the reference, [view, row, column, rgb]."""
         linear = np.empty(self.images.shape)
         linear[...] = self.background
-        fresh = Shading(self.shading.scene, self.shading.triangles, self.shading.world_from_display)
+        old = self.shading
+        fresh = Shading(old.scene, old.triangles, old.world_from_display, lod=old.lod)
         shade_over(linear, fresh, self.solid, self.rig, self.grid)
         shade_over(linear, fresh, self.blended, self.rig, self.grid)
         return linear
@@ -73,12 +74,16 @@ def case_of(
     rig: Rig,
     grid: ViewGrid,
     display_from_world: NDArray[np.float64] | None = None,
+    *,
+    lod: str = "area",
 ) -> Case:
     background = (0.25, 0.5, 0.0625)
-    with passes(device, scene, rig, grid, display_from_world, background=background) as opened:
+    with passes(
+        device, scene, rig, grid, display_from_world, background=background, lod=lod
+    ) as opened:
         found, triangles = opened.winners(), opened.triangles()
         images = opened.images()
-        shading = Shading(scene, triangles, np.linalg.inv(opened.display_from_world))
+        shading = Shading(scene, triangles, np.linalg.inv(opened.display_from_world), lod=lod)
     solid = Visibility(found.solid, found.solid_depths.astype(np.float64))
     blended = Visibility(found.blended, found.blended_depths.astype(np.float64))
     return Case(images, solid, blended, shading, rig, grid, background)
@@ -274,7 +279,10 @@ def test_random_scenes(device: Device, seed: int) -> None:
     assert np.count_nonzero(error > 0.01) <= 1e-3 * error.size
 
 
-def test_a_scene_of_many_groups_of_textures(device: Device, rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("lod", ["area", "anisotropic"])
+def test_a_scene_of_many_groups_of_textures(
+    device: Device, rng: np.random.Generator, lod: str
+) -> None:
     """Sizes and wraps that need arrays of their own; each triangle still gets its own picture."""
     kinds = [(8, 8), (16, 8), (8, 16), (4, 4), (3, 5), (1, 1)]
     wraps = [("repeat", "repeat"), ("clamp", "mirror")]
@@ -289,7 +297,7 @@ def test_a_scene_of_many_groups_of_textures(device: Device, rng: np.random.Gener
         meshes.append(mesh_of(triangle, index, texcoords=uv))
         instances.append(Instance(str(index), index, placement(rng)))
     scene = Scene("groups", tuple(meshes), tuple(instances), tuple(materials), images)
-    case = case_of(device, scene, *views(128, 72, 2))
+    case = case_of(device, scene, *views(128, 72, 2), lod=lod)
     assert len(np.unique(case.solid.ids)) == len(meshes) + 1
     # Magnified, so that odd sizes, whose mip levels devices make as they like, stay at level 0.
     assert case.error().max() < texture_tolerance(3.0)
@@ -304,12 +312,6 @@ def _no_srgb(encoded: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _coarser(*arguments: object) -> NDArray[np.float64]:
     return _area_lod(*arguments) + 1.0  # type: ignore[arg-type]
-
-
-def _longest(dx: NDArray[np.float64], dy: NDArray[np.float64], size: object) -> NDArray[np.float64]:
-    """Level of detail by the longer side, as OpenGL has it."""
-    sides = [np.linalg.norm(d * np.array(size), axis=1) for d in (dx, dy)]
-    return np.log2(np.maximum(*sides))
 
 
 def _upside_down(pixels: NDArray[np.uint8], *, srgb: bool) -> list[NDArray[np.float64]]:
@@ -327,7 +329,7 @@ def _brighter(f0: NDArray[np.float64], *rest: object, **cosines: object) -> NDAr
     return 1.2 * _specular(f0, *rest, **cosines)  # type: ignore[arg-type]
 
 
-_area_lod, _mip_chain = shade.area_lod, shade.mip_chain
+_area_lod, _mip_chain = textures.area_lod, shade.mip_chain
 _texture, _specular = shade.Surface.texture, shade.specular_brdf
 
 
@@ -335,7 +337,7 @@ _texture, _specular = shade.Surface.texture, shade.specular_brdf
     ("owner", "name", "fault"),
     [
         (textures, "linear_from_srgb", _no_srgb),
-        (shade, "area_lod", _coarser),
+        (textures, "area_lod", _coarser),
         (shade, "mip_chain", _upside_down),
         (shade.Surface, "texture", _green_down),
         (shade, "specular_brdf", _brighter),
@@ -356,7 +358,7 @@ def test_wrong_shading_is_caught(
     assert case.error().max() > FULL_TOLERANCE
 
 
-@pytest.mark.parametrize("fault", [_coarser, _longest])
+@pytest.mark.parametrize("fault", [_coarser, textures.long_axis_lod])
 def test_wrong_levels_of_detail_are_caught(
     device: Device,
     rng: np.random.Generator,
@@ -366,7 +368,7 @@ def test_wrong_levels_of_detail_are_caught(
     material = Material("picture", unlit=True, base_color_texture=TextureSlot(0))
     case = case_of(device, wall(material, uv=3.0, turn_rad=0.9, images=(noise(rng),)), *views())
     assert case.error().max() < texture_tolerance(3.0)
-    monkeypatch.setattr(shade, "area_lod", fault)
+    monkeypatch.setattr(textures, "area_lod", fault)
     assert case.error().max() > texture_tolerance(3.0)
 
 

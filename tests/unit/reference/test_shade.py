@@ -143,9 +143,11 @@ def test_wraps(wrap: str, expected: list[int]) -> None:
 
 def test_the_level_of_detail_counts_texels_of_a_pixel() -> None:
     dx, dy = np.array([[0.5, 0.0]]), np.array([[0.0, 0.25]])
-    np.testing.assert_allclose(area_lod(dx, dy, (16, 8)), 2.0)  # 8 × 2 texels: 4², so level 2
-    np.testing.assert_allclose(area_lod(2 * dx, 2 * dy, (16, 8)), 3.0)
-    assert area_lod(dx, dx, (16, 8)) < -15  # no area, no blur
+    np.testing.assert_allclose(
+        area_lod(dx * (16, 8), dy * (16, 8)), 2.0
+    )  # 8 × 2 texels: 4², so level 2
+    np.testing.assert_allclose(area_lod(dx * (32, 16), dy * (32, 16)), 3.0)
+    assert area_lod(dx * (16, 8), dx * (16, 8)) < -15  # no area, no blur
 
 
 # ---- surfaces ---------------------------------------------------------------------------------
