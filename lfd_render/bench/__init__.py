@@ -1,0 +1,1 @@
+"""Studies: what choices cost and what they gain."""
