@@ -123,54 +123,24 @@ def lobe_samples(roughness: float, count: int, face: int) -> Float64:
 def irradiance(pixels: NDArray[np.float32]) -> Float64:
     """Matrices M, [rgb, 4, 4]: irradiance/π of a normal n is (n, 1)ᵗ·M·(n, 1).
 
-    The picture's spherical harmonics to order 2 under the cosine lobe (Ramamoorthi and Hanrahan
-    2001, equations 11 and 12, with their constants over π).
+    The picture's spherical harmonics to order 2 under the cosine lobe, as the quadratic form of
+    Ramamoorthi and Hanrahan 2001, equations 11 and 12: to that order the lobe max(0, c), c = n·l,
+    is 1/4 + c/2 + 5/32·(3c² − 1), so the form's entries are moments ∫L·(l, 1)·(l, 1)ᵗ of the light.
     """
     light = _finer(pixels.astype(np.float64))
     rows, columns = light.shape[:2]
     edges = np.cos(np.arange(rows + 1) * np.pi / rows)
     solid_angle = (edges[:-1] - edges[1:]) * 2.0 * np.pi / columns
-    theta = (np.arange(rows) + 0.5) * np.pi / rows
-    phi = ((np.arange(columns) + 0.5) / columns - 0.5) * 2.0 * np.pi
-    # Moments of the light: over columns against 1, cos, sin and their doubles, then over rows.
-    waves = np.stack([np.ones(columns), np.cos(phi), np.sin(phi), np.cos(2 * phi), np.sin(2 * phi)])
-    ring = np.einsum("wx,yxc->wyc", waves, light) * solid_angle[None, :, None]
-    sin, y = np.sin(theta), np.cos(theta)
-    one = ring[0].sum(axis=0)
-    m_y, m_x, m_z = y @ ring[0], sin @ ring[1], sin @ ring[2]
-    m_yy = (y * y) @ ring[0]
-    half, wave = (sin * sin) @ ring[0] / 2.0, (sin * sin) @ ring[3] / 2.0
-    m_xx, m_zz, m_xz = half + wave, half - wave, (sin * sin) @ ring[4] / 2.0
-    m_xy, m_yz = (sin * y) @ ring[1], (sin * y) @ ring[2]
-    return np.stack(
-        [
-            _quadratic_form(
-                one[c],
-                (m_x[c], m_y[c], m_z[c]),
-                (
-                    (m_xx[c], m_xy[c], m_xz[c]),
-                    (m_xy[c], m_yy[c], m_yz[c]),
-                    (m_xz[c], m_yz[c], m_zz[c]),
-                ),
-            )
-            for c in range(3)
-        ]
-    )
-
-
-def _quadratic_form(
-    one: float, first: tuple[float, ...], second: tuple[tuple[float, ...], ...]
-) -> Float64:
-    """One channel's matrix from the light's moments ∫L, ∫L·n and ∫L·n·nᵗ.
-
-    The cosine lobe to order 2 is max(0, c) ≈ 1/4 + c/2 + 5/32·(3c² − 1) for c = n·l; its integral
-    against the light is a quadratic form in n of these moments.
-    """
-    matrix = np.zeros((4, 4))
-    matrix[:3, :3] = 15.0 / 32.0 * np.array(second)
-    matrix[:3, 3] = matrix[3, :3] = 0.25 * np.array(first)
-    matrix[3, 3] = (1.0 / 4.0 - 5.0 / 32.0) * one
-    return matrix / np.pi
+    theta = ((np.arange(rows) + 0.5) * np.pi / rows)[:, None]
+    phi = (((np.arange(columns) + 0.5) / columns - 0.5) * 2.0 * np.pi)[None]
+    x, y, z = np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)
+    l = np.stack(np.broadcast_arrays(x, y, z, 1.0), axis=-1).reshape(-1, 4)  # noqa: E741 (its letter)
+    arriving = (light * solid_angle[:, None, None]).reshape(-1, 3)
+    moments = np.stack([(l * arriving[:, c, None]).T @ l for c in range(3)])
+    lobe = np.full((4, 4), 15.0 / 32.0)
+    lobe[3, :3] = lobe[:3, 3] = 1.0 / 4.0
+    lobe[3, 3] = 1.0 / 4.0 - 5.0 / 32.0
+    return np.asarray(lobe * moments / np.pi)
 
 
 def _finer(pixels: Float64) -> Float64:

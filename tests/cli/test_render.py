@@ -112,6 +112,22 @@ def test_bad_environments(
     assert result.error.startswith(expected)
 
 
+def test_bright_lights_get_a_hint_unless_there_is_an_exposure(
+    command: Command, scene: Path, display: Path, tmp_path: Path
+) -> None:
+    document = json.loads(scene.read_text(encoding="utf-8"))
+    lamp = {"type": "point", "intensity": 54351}
+    document["extensions"] = {"KHR_lights_punctual": {"lights": [lamp]}}
+    document["nodes"][1]["extensions"] = {"KHR_lights_punctual": {"light": 0}}
+    lit = tmp_path / "lit.gltf"
+    lit.write_text(json.dumps(document), encoding="utf-8")
+    arguments = ("render", lit, "-o", tmp_path / "a.png", "-d", display)
+    # 54351 cd from 5 away on a white wall: 54351/25/π is 692, 9.4 stops.
+    assert "white about 692 times as bright" in command(*arguments).stderr
+    assert "try --exposure -9.5EV" in command(*arguments).stderr
+    assert "--exposure" not in command(*arguments, "--exposure", "1").stderr
+
+
 def write_panorama(path: Path, pixels: NDArray[np.float32]) -> None:
     out = oiio.ImageOutput.create(str(path))
     assert out.open(str(path), oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "float"))
