@@ -1,12 +1,9 @@
-"""The renderer: one device, any scene, any display."""
+"""Renders scenes for displays: uploads what is new, and runs a technique's frames."""
 
 from __future__ import annotations
 
-import statistics
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Any
 
@@ -14,158 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.display import Camera, DisplayProfile, Rig, ViewGrid
-from lfd_render.display.model import Spacing
 from lfd_render.errors import ResourceError, SceneError, UsageError
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
-from lfd_render.gpu.layout import LOD_RULES
 from lfd_render.gpu.lighting import EnvironmentMap
 from lfd_render.gpu.scene_buffers import SceneBuffers
 from lfd_render.panel.eia import Eia
 from lfd_render.passes.encode import Encode
 from lfd_render.passes.placement import Placement
 from lfd_render.passes.prefilter import Prefilter
-from lfd_render.passes.view_buffers import WINNERS
 from lfd_render.passes.view_target import ViewTarget
-from lfd_render.passes.weave import Weave
+from lfd_render.renderer.frames import PanelFrames, Timings
+from lfd_render.renderer.options import MOST_VIEWS, RenderOptions
 from lfd_render.scene import Environment, Scene
 from lfd_render.techniques import Lfdpr, Mvr, Technique
 
 REPEAT_TURN_RAD = np.deg2rad(0.5)  # how far the scene turns between repeated frames
-TECHNIQUES = ("lfdpr", "mvr")
-PRESETS = ("default", "paper")
-PROJECTIONS = ("shear", "general")
-ENVIRONMENTS = ("studio", "none")
-MOST_VIEWS = 1024
-MOST_RADIANCE = 65504.0  # what half floats hold
 MOST_VIEW_PIXELS = 1 << 32  # of all views together: hours on a processor, and far above any panel
-
-
-@dataclass(frozen=True)
-class RenderOptions:
-    """How to render. view_size: upright views of (width, height); None: views that follow the
-    lenses, with as many rows as makes all views together as large as the panel. projection: how
-    points reach the views, by the shear that parallel views share or by each view's own matrix.
-    splat: how a pixel's nearest point is found, by 64-bit atomics, by two passes of 32-bit ones or
-    by work groups that own their pixels, with the same picture; auto: what suits the device.
-    environment: the built-in studio, none, or a picture, turned about the world's +y,
-    counter-clockwise seen from above, and scaled.
-    lod: how textures are filtered, one of LOD_RULES; None: as the preset has it (`lod_rule`)."""
-
-    views: int | None = None
-    view_size: tuple[int, int] | None = None
-    technique: str = "lfdpr"
-    preset: str = "default"
-    spacing: Spacing | None = None
-    seed: int = 0
-    repeat: int = 1
-    background: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    exposure: float = 1.0
-    projection: str = "shear"
-    splat: str = "auto"
-    environment: str | Environment = "studio"
-    environment_turn_rad: float = 0.0
-    environment_intensity: float = 1.0
-    lod: str | None = None
-
-    def __post_init__(self) -> None:
-        """Check ranges; raises UsageError."""
-        for name, choice, choices in (
-            ("technique", self.technique, TECHNIQUES),
-            ("preset", self.preset, PRESETS),
-            ("projection", self.projection, PROJECTIONS),
-            ("lod", self.lod_rule, LOD_RULES),
-        ):
-            if choice not in choices:
-                raise UsageError(f"{name} '{choice}': unknown; use {' or '.join(choices)}")
-        if self.lod == "multiview" and self.technique == "mvr":
-            others = " or ".join(rule for rule in LOD_RULES if rule != "multiview")
-            raise UsageError(f"lod 'multiview': mvr has no points that views share; use {others}")
-        self._check_splat()
-        if self.views is not None and not _whole(self.views, MOST_VIEWS):
-            raise UsageError(f"views: {self.views!r} is out of range; use 1 to {MOST_VIEWS}")
-        size = self.view_size
-        if size is not None and not (
-            isinstance(size, tuple | list)
-            and len(size) == 2
-            and all(_whole(n, 16384) for n in size)
-        ):
-            raise UsageError(
-                f"view size: {size!r} is out of range; use two whole numbers, 1 to 16384 a side"
-            )
-        if len(self.background) != 3 or not all(0 <= c <= MOST_RADIANCE for c in self.background):
-            raise UsageError(
-                f"background: {self.background}; use three numbers from 0 to {MOST_RADIANCE:g}"
-            )
-        if self.repeat < 1:
-            raise UsageError(f"repeat: {self.repeat} is out of range; use 1 or more")
-        if not 0.0 < self.exposure < np.inf:
-            raise UsageError(f"exposure: {self.exposure} is out of range; use a positive number")
-        if not isinstance(self.environment, Environment) and self.environment not in ENVIRONMENTS:
-            raise UsageError(
-                f"environment {self.environment!r}: unknown; use {', '.join(ENVIRONMENTS)} or "
-                "an Environment"
-            )
-        if not np.isfinite(self.environment_turn_rad):
-            raise UsageError(
-                f"environment turn: {self.environment_turn_rad}; use a finite number of radians"
-            )
-        if not 0.0 <= self.environment_intensity <= MOST_RADIANCE:
-            raise UsageError(
-                f"environment intensity: {self.environment_intensity} is out of range; "
-                f"use a number from 0 to {MOST_RADIANCE:g}"
-            )
-
-    @property
-    def lod_rule(self) -> str:
-        """The rule of LOD_RULES in use: the preset's where none is given. The paper filters LFDPR's
-        textures by multiview mipmapping (section 3.3) and those of MVR as hardware does."""
-        if self.lod is not None:
-            return self.lod
-        if self.preset == "paper":
-            return "long-axis" if self.technique == "mvr" else "multiview"
-        return "anisotropic"
-
-    def _check_splat(self) -> None:
-        if self.splat not in WINNERS:
-            raise UsageError(f"splat '{self.splat}': unknown; use {', '.join(WINNERS)}")
-        if self.splat == "owned" and self.projection == "general":
-            raise UsageError(
-                "splat 'owned': needs projection 'shear', whose views share their rows; "
-                "with 'general' use auto"
-            )
-        if self.splat != "auto" and self.technique != "lfdpr":
-            raise UsageError(
-                f"splat '{self.splat}': technique '{self.technique}' does not splat; "
-                "use it with lfdpr"
-            )
-
-
-def _whole(value: object, most: int) -> bool:
-    return isinstance(value, int | np.integer) and 1 <= int(value) <= most
-
-
-@dataclass
-class _Timings:
-    """Milliseconds of one call: what is done once, and each frame's stages and whole."""
-
-    once: dict[str, float] = field(default_factory=dict)
-    frames: list[tuple[float, dict[str, float]]] = field(default_factory=list)
-
-    def measure(self, name: str, device: Device, work: Callable[[], Any]) -> Any:
-        """Run something once, timed to an idle device."""
-        start = time.perf_counter()
-        result = work()
-        device.finish()
-        self.once[name] = self.once.get(name, 0.0) + 1000.0 * (time.perf_counter() - start)
-        return result
-
-    def summary(self) -> dict[str, float]:
-        """The median frame's whole and stages beside what was done once, in ms."""
-        order = sorted(self.frames, key=lambda frame: frame[0])
-        stages = order[(len(order) - 1) // 2][1] if order else {}
-        frame = {"frame": statistics.median(f[0] for f in order)} if order else {}
-        return {key: round(ms, 3) for key, ms in {**self.once, **stages, **frame}.items()}
 
 
 class Renderer:
@@ -233,12 +95,12 @@ class Renderer:
         grid = _grid(display, choice, rig.views)
         _check_size(grid, rig.views)
         _check_in_front(scene, camera, rig)
-        timings = _Timings()
+        timings = Timings()
         buffers = self._upload(scene, choice, timings)
 
-        def compile_all() -> _PanelFrames:
+        def compile_all() -> PanelFrames:
             technique = self._technique(buffers, rig, grid, choice)
-            frames = _PanelFrames(self.device, technique, display, choice.exposure)
+            frames = PanelFrames(self.device, technique, display, choice.exposure)
             frames.warm_up(Placement(camera.display_from_world(rig.panel_mm), choice.background))
             return frames
 
@@ -309,7 +171,7 @@ class Renderer:
         grid = ViewGrid.upright(display, width, height)
         _check_size(grid, rig.views)
         _check_in_front(scene, camera, rig)
-        buffers = self._upload(scene, choice, _Timings())
+        buffers = self._upload(scene, choice, Timings())
         technique = self._technique(buffers, rig, grid, choice)
         encode = Encode(self.device, grid.columns, technique.target.images.height)
         pictures = np.empty((rig.views, grid.rows, grid.columns, 3), np.uint8)
@@ -342,7 +204,7 @@ class Renderer:
             self._drop_environment()
             raise
 
-    def _upload(self, scene: Scene, choice: RenderOptions, timings: _Timings) -> SceneBuffers:
+    def _upload(self, scene: Scene, choice: RenderOptions, timings: Timings) -> SceneBuffers:
         """The scene under its light; what is on the device already stays there."""
         if self._buffers is None or self._scene is not scene:
             self._drop_scene()
@@ -361,7 +223,7 @@ class Renderer:
         )
         return self._buffers
 
-    def _prefiltered(self, environment: Environment, timings: _Timings) -> EnvironmentMap:
+    def _prefiltered(self, environment: Environment, timings: Timings) -> EnvironmentMap:
         if self._environment_map is None or self._environment is not environment:
             self._drop_environment()
             prefilter = Prefilter(self.device)
@@ -398,56 +260,6 @@ class Renderer:
             winners=choice.splat,
             lod=choice.lod_rule,
         )
-
-
-class _PanelFrames:
-    """Frames of one technique, from camera to encoded panel image."""
-
-    def __init__(
-        self, device: Device, technique: Technique, display: DisplayProfile, exposure: float
-    ) -> None:
-        self.technique = technique
-        self._device = device
-        self._exposure = exposure
-        target = technique.target
-        self._weave = Weave(device, display, target.grid, target.rig.views)
-        self._encode = Encode(device, *display.resolution_px)
-
-    def warm_up(self, placement: Placement) -> None:
-        """Run a little of everything: a software device compiles shaders when they first run."""
-        clock = StageClock(self._device)
-        self.technique.begin(placement, clock)
-        self.technique.warm_up(clock)
-        self._weave(self.technique.target.warm_up_band)
-        self._encode(self._weave.panel, 0, self._exposure)
-
-    def run(self, placement: Placement) -> tuple[float, dict[str, float]]:
-        """One frame: its milliseconds, whole and by stage."""
-        complete = False
-        while not complete:
-            clock = StageClock(self._device)
-            self._device.finish()
-            start = time.perf_counter()
-            self.technique.begin(placement, clock)
-            for band in self.technique.target.bands:
-                self.technique.render(band, clock)
-                with clock.stage("weave"):
-                    self._weave(band)
-            with clock.stage("encode_srgb"):
-                self._encode(self._weave.panel, 0, self._exposure)
-            self._device.finish()
-            elapsed_ms = 1000.0 * (time.perf_counter() - start)
-            complete = self.technique.complete()
-        return elapsed_ms, clock.stages_ms
-
-    def read(self) -> tuple[NDArray[np.float16], NDArray[np.uint8]]:
-        """The last frame in linear light and encoded."""
-        return self._weave.read_linear(), self._encode.read()
-
-    def release(self) -> None:
-        """Free everything, the technique included."""
-        for owner in (self.technique, self._weave, self._encode):
-            owner.release()
 
 
 def camera_for(scene: Scene, display: DisplayProfile) -> Camera:

@@ -1,0 +1,93 @@
+"""Frames of one technique, from camera to encoded panel image, and their timings."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lfd_render.display import DisplayProfile
+from lfd_render.gpu.clock import StageClock
+from lfd_render.gpu.device import Device
+from lfd_render.passes.encode import Encode
+from lfd_render.passes.placement import Placement
+from lfd_render.passes.weave import Weave
+from lfd_render.techniques import Technique
+
+
+@dataclass
+class Timings:
+    """Milliseconds of one call: what is done once, and each frame's stages and whole."""
+
+    once: dict[str, float] = field(default_factory=dict)
+    frames: list[tuple[float, dict[str, float]]] = field(default_factory=list)
+
+    def measure(self, name: str, device: Device, work: Callable[[], Any]) -> Any:
+        """Run something once, timed to an idle device."""
+        start = time.perf_counter()
+        result = work()
+        device.finish()
+        self.once[name] = self.once.get(name, 0.0) + 1000.0 * (time.perf_counter() - start)
+        return result
+
+    def summary(self) -> dict[str, float]:
+        """The median frame's whole and stages beside what was done once, in ms."""
+        order = sorted(self.frames, key=lambda frame: frame[0])
+        stages = order[(len(order) - 1) // 2][1] if order else {}
+        frame = {"frame": statistics.median(f[0] for f in order)} if order else {}
+        return {key: round(ms, 3) for key, ms in {**self.once, **stages, **frame}.items()}
+
+
+class PanelFrames:
+    """Frames of one technique, from camera to encoded panel image."""
+
+    def __init__(
+        self, device: Device, technique: Technique, display: DisplayProfile, exposure: float
+    ) -> None:
+        self.technique = technique
+        self._device = device
+        self._exposure = exposure
+        target = technique.target
+        self._weave = Weave(device, display, target.grid, target.rig.views)
+        self._encode = Encode(device, *display.resolution_px)
+
+    def warm_up(self, placement: Placement) -> None:
+        """Run a little of everything: a software device compiles shaders when they first run."""
+        clock = StageClock(self._device)
+        self.technique.begin(placement, clock)
+        self.technique.warm_up(clock)
+        self._weave(self.technique.target.warm_up_band)
+        self._encode(self._weave.panel, 0, self._exposure)
+
+    def run(self, placement: Placement) -> tuple[float, dict[str, float]]:
+        """One frame: its milliseconds, whole and by stage."""
+        complete = False
+        while not complete:
+            clock = StageClock(self._device)
+            self._device.finish()
+            start = time.perf_counter()
+            self.technique.begin(placement, clock)
+            for band in self.technique.target.bands:
+                self.technique.render(band, clock)
+                with clock.stage("weave"):
+                    self._weave(band)
+            with clock.stage("encode_srgb"):
+                self._encode(self._weave.panel, 0, self._exposure)
+            self._device.finish()
+            elapsed_ms = 1000.0 * (time.perf_counter() - start)
+            complete = self.technique.complete()
+        return elapsed_ms, clock.stages_ms
+
+    def read(self) -> tuple[NDArray[np.float16], NDArray[np.uint8]]:
+        """The last frame in linear light and encoded."""
+        return self._weave.read_linear(), self._encode.read()
+
+    def release(self) -> None:
+        """Free everything, the technique included."""
+        for owner in (self.technique, self._weave, self._encode):
+            owner.release()

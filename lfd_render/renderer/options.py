@@ -1,0 +1,124 @@
+"""What a caller may choose about rendering."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lfd_render.display.model import Spacing
+from lfd_render.errors import UsageError
+from lfd_render.gpu.layout import LOD_RULES
+from lfd_render.passes.view_buffers import WINNERS
+from lfd_render.scene import Environment
+
+TECHNIQUES = ("lfdpr", "mvr")
+PRESETS = ("default", "paper")
+PROJECTIONS = ("shear", "general")
+ENVIRONMENTS = ("studio", "none")
+MOST_VIEWS = 1024
+MOST_RADIANCE = 65504.0  # what half floats hold
+
+
+@dataclass(frozen=True)
+class RenderOptions:
+    """How to render. view_size: upright views of (width, height); None: views that follow the
+    lenses, with as many rows as makes all views together as large as the panel. projection: how
+    points reach the views, by the shear that parallel views share or by each view's own matrix.
+    splat: how a pixel's nearest point is found, by 64-bit atomics, by two passes of 32-bit ones or
+    by work groups that own their pixels, with the same picture; auto: what suits the device.
+    environment: the built-in studio, none, or a picture, turned about the world's +y,
+    counter-clockwise seen from above, and scaled.
+    lod: how textures are filtered, one of LOD_RULES; None: as the preset has it (`lod_rule`)."""
+
+    views: int | None = None
+    view_size: tuple[int, int] | None = None
+    technique: str = "lfdpr"
+    preset: str = "default"
+    spacing: Spacing | None = None
+    seed: int = 0
+    repeat: int = 1
+    background: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    exposure: float = 1.0
+    projection: str = "shear"
+    splat: str = "auto"
+    environment: str | Environment = "studio"
+    environment_turn_rad: float = 0.0
+    environment_intensity: float = 1.0
+    lod: str | None = None
+
+    def __post_init__(self) -> None:
+        """Check ranges; raises UsageError."""
+        for name, choice, choices in (
+            ("technique", self.technique, TECHNIQUES),
+            ("preset", self.preset, PRESETS),
+            ("projection", self.projection, PROJECTIONS),
+            ("lod", self.lod_rule, LOD_RULES),
+        ):
+            if choice not in choices:
+                raise UsageError(f"{name} '{choice}': unknown; use {' or '.join(choices)}")
+        if self.lod == "multiview" and self.technique == "mvr":
+            others = " or ".join(rule for rule in LOD_RULES if rule != "multiview")
+            raise UsageError(f"lod 'multiview': mvr has no points that views share; use {others}")
+        self._check_splat()
+        if self.views is not None and not _whole(self.views, MOST_VIEWS):
+            raise UsageError(f"views: {self.views!r} is out of range; use 1 to {MOST_VIEWS}")
+        size = self.view_size
+        if size is not None and not (
+            isinstance(size, tuple | list)
+            and len(size) == 2
+            and all(_whole(n, 16384) for n in size)
+        ):
+            raise UsageError(
+                f"view size: {size!r} is out of range; use two whole numbers, 1 to 16384 a side"
+            )
+        if len(self.background) != 3 or not all(0 <= c <= MOST_RADIANCE for c in self.background):
+            raise UsageError(
+                f"background: {self.background}; use three numbers from 0 to {MOST_RADIANCE:g}"
+            )
+        if self.repeat < 1:
+            raise UsageError(f"repeat: {self.repeat} is out of range; use 1 or more")
+        if not 0.0 < self.exposure < np.inf:
+            raise UsageError(f"exposure: {self.exposure} is out of range; use a positive number")
+        if not isinstance(self.environment, Environment) and self.environment not in ENVIRONMENTS:
+            raise UsageError(
+                f"environment {self.environment!r}: unknown; use {', '.join(ENVIRONMENTS)} or "
+                "an Environment"
+            )
+        if not np.isfinite(self.environment_turn_rad):
+            raise UsageError(
+                f"environment turn: {self.environment_turn_rad}; use a finite number of radians"
+            )
+        if not 0.0 <= self.environment_intensity <= MOST_RADIANCE:
+            raise UsageError(
+                f"environment intensity: {self.environment_intensity} is out of range; "
+                f"use a number from 0 to {MOST_RADIANCE:g}"
+            )
+
+    @property
+    def lod_rule(self) -> str:
+        """The rule of LOD_RULES in use: the preset's where none is given. The paper filters LFDPR's
+        textures by multiview mipmapping (section 3.3) and those of MVR as hardware does."""
+        if self.lod is not None:
+            return self.lod
+        if self.preset == "paper":
+            return "long-axis" if self.technique == "mvr" else "multiview"
+        return "anisotropic"
+
+    def _check_splat(self) -> None:
+        if self.splat not in WINNERS:
+            raise UsageError(f"splat '{self.splat}': unknown; use {', '.join(WINNERS)}")
+        if self.splat == "owned" and self.projection == "general":
+            raise UsageError(
+                "splat 'owned': needs projection 'shear', whose views share their rows; "
+                "with 'general' use auto"
+            )
+        if self.splat != "auto" and self.technique != "lfdpr":
+            raise UsageError(
+                f"splat '{self.splat}': technique '{self.technique}' does not splat; "
+                "use it with lfdpr"
+            )
+
+
+def _whole(value: object, most: int) -> bool:
+    return isinstance(value, int | np.integer) and 1 <= int(value) <= most
