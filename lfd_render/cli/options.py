@@ -47,6 +47,41 @@ class Lod(StrEnum):
     ANISOTROPIC = "anisotropic"
 
 
+class Lattice(StrEnum):
+    """Where points lie."""
+
+    ROWS = "rows"
+    PAPER = "paper"
+
+
+class PointSource(StrEnum):
+    """What makes points of the paper's lattice."""
+
+    COMPUTE = "compute"
+    RASTER = "raster"
+
+
+class Density(StrEnum):
+    """How dense points are along their two axes."""
+
+    LFD = "lfd"
+    ISOTROPIC = "isotropic"
+
+
+class Culling(StrEnum):
+    """Which triangles are thought to be seen."""
+
+    EXACT = "exact"
+    VERTICES = "vertices"
+
+
+class ShadePlace(StrEnum):
+    """Where a pixel is shaded."""
+
+    RAY = "ray"
+    POINT = "point"
+
+
 class Spacing(StrEnum):
     """Rule by which the eyes of the views stand."""
 
@@ -108,9 +143,7 @@ ViewSizeOption = Annotated[
 TechniqueOption = Annotated[Technique, typer.Option(help="Rendering technique.")]
 PresetOption = Annotated[
     Preset,
-    typer.Option(
-        help="default: our best; paper: the paper's upright views and stochastic culling."
-    ),
+    typer.Option(help="default: our best; paper: every choice as the paper has it."),
 ]
 SplatOption = Annotated[
     Splat,
@@ -118,6 +151,45 @@ SplatOption = Annotated[
         help="How lfdpr finds nearest points: 64-bit atomics, two passes of 32-bit ones, or none "
         "in rows that work groups own. The picture is the same."
     ),
+]
+LatticeOption = Annotated[
+    Lattice | None,
+    typer.Option(
+        help="Points on the rows that all views share, or the paper's lattice in each triangle's "
+        "plane; else as the preset has it. The picture is the same, unless shaded at points."
+    ),
+]
+PointSourceOption = Annotated[
+    PointSource | None,
+    typer.Option(help="What makes points of the paper's lattice: compute, or its raster stages."),
+]
+DensityOption = Annotated[
+    Density | None,
+    typer.Option(help="Points as dense along each axis as it needs, or as the denser one needs."),
+]
+TextureLimitOption = Annotated[
+    bool | None,
+    typer.Option(
+        "--texture-limit/--no-texture-limit",
+        help="Larger points where texels are (equations 1-3).",
+        show_default=False,
+    ),
+]
+CullingOption = Annotated[
+    Culling | None,
+    typer.Option(help="Exact, or the paper's by vertices, which loses triangles."),
+]
+StochasticCullingOption = Annotated[
+    bool | None,
+    typer.Option(
+        "--stochastic-culling/--no-stochastic-culling",
+        help="Drop some triangles below a tenth of a pixel, which punches holes.",
+        show_default=False,
+    ),
+]
+ShadeOption = Annotated[
+    ShadePlace | None,
+    typer.Option(help="Where pixels are shaded: at their ray's hit, or at the point they show."),
 ]
 CameraOption = Annotated[
     str | None,

@@ -38,6 +38,13 @@ def render(
     environment_intensity: options.EnvironmentIntensityOption = 1.0,
     exposure: options.ExposureOption = None,
     lod: options.LodOption = None,
+    lattice: options.LatticeOption = None,
+    point_source: options.PointSourceOption = None,
+    density: options.DensityOption = None,
+    texture_limit: options.TextureLimitOption = None,
+    culling: options.CullingOption = None,
+    stochastic_culling: options.StochasticCullingOption = None,
+    shade: options.ShadeOption = None,
     seed: options.SeedOption = 0,
     repeat: Annotated[
         int, typer.Option(min=1, help="Render N frames with a moving camera; time their median.")
@@ -84,8 +91,16 @@ def render(
             splat=splat.value,
             spacing=spacing.value if spacing else None,
             lod=lod.value if lod else None,
+            lattice=lattice.value if lattice else None,
+            point_source=point_source.value if point_source else None,
+            density=density.value if density else None,
+            texture_limit=texture_limit,
+            culling=culling.value if culling else None,
+            stochastic_culling=stochastic_culling,
+            shade=shade.value if shade else None,
             seed=seed,
             repeat=repeat,
+            effort=json,
             **light,
         )
     with watch.span("encode"), progress("Writing"):

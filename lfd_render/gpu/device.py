@@ -17,9 +17,16 @@ import moderngl
 
 from lfd_render.errors import GpuError, ResourceError
 from lfd_render.gpu.memory import Ledger, Owned, texture_bytes
-from lfd_render.gpu.raw import ERRORS, MAX_COMPUTE_SHADER_STORAGE_BLOCKS, OUT_OF_MEMORY, RawGl
+from lfd_render.gpu.raw import (
+    ERRORS,
+    MAX_COMPUTE_SHADER_STORAGE_BLOCKS,
+    MAX_GEOMETRY_SHADER_STORAGE_BLOCKS,
+    OUT_OF_MEMORY,
+    RawGl,
+)
 
 REQUIRED_VERSION = 450
+GEOMETRY_STORAGE_BLOCKS = 10  # of cells/align.geom
 STORAGE_BLOCKS = 16  # of the largest shader; OpenGL promises 8, Mesa offers 16
 SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "lavapipe")
 INSTALL_HINT = (
@@ -45,6 +52,7 @@ class DeviceInfo:
     max_texture_size: int
     max_groups: int
     max_storage_blocks: int  # of a compute shader
+    geometry_storage: bool  # whether the geometry stage has storage blocks to speak of
     max_texture_bytes: int  # of one texture with its mip levels
     texture_budget_bytes: int  # of all textures of a scene
 
@@ -166,6 +174,7 @@ def _describe(context: moderngl.Context, raw: RawGl, egl_index: int) -> DeviceIn
         max_texture_size=int(info["GL_MAX_TEXTURE_SIZE"]),
         max_groups=int(info["GL_MAX_COMPUTE_WORK_GROUP_COUNT"][0]),
         max_storage_blocks=raw.integer(MAX_COMPUTE_SHADER_STORAGE_BLOCKS),
+        geometry_storage=raw.integer(MAX_GEOMETRY_SHADER_STORAGE_BLOCKS) >= GEOMETRY_STORAGE_BLOCKS,
         max_texture_bytes=max_texture_bytes,
         texture_budget_bytes=texture_budget_bytes,
     )

@@ -77,6 +77,42 @@ class LayerTarget(Owned):
             self._device.ledger.add("depth", -4 * self.texture.width * self.texture.height)
 
 
+class EmptyTarget(Owned):
+    """A framebuffer of some size and no picture: fragments only write to buffers."""
+
+    def __init__(self, device: Device, width: int, height: int) -> None:
+        super().__init__(device)
+        self._size = width, height
+        self._name = ctypes.c_uint()
+        raw = device.raw
+        raw.glCreateFramebuffers(1, ctypes.byref(self._name))
+        raw.glNamedFramebufferParameteri(self._name, gl.FRAMEBUFFER_DEFAULT_WIDTH, width)
+        raw.glNamedFramebufferParameteri(self._name, gl.FRAMEBUFFER_DEFAULT_HEIGHT, height)
+
+    def use(self) -> None:
+        """Draw into it from now on, whichever way triangles turn."""
+        raw = self._device.raw
+        raw.glBindFramebuffer(gl.FRAMEBUFFER, self._name)
+        raw.glViewport(0, 0, *self._size)
+        raw.glDisable(gl.DEPTH_TEST)
+        raw.glDisable(gl.CULL_FACE)
+
+    def _free(self) -> None:
+        self._device.raw.glDeleteFramebuffers(1, ctypes.byref(self._name))
+
+
+@contextmanager
+def conservative_raster(device: Device, wanted: bool) -> Iterator[None]:
+    """Draws inside reach every pixel that a triangle touches, where wanted and the driver can."""
+    if wanted:
+        device.raw.glEnable(gl.CONSERVATIVE_RASTERIZATION_NV)
+    try:
+        yield
+    finally:
+        if wanted:
+            device.raw.glDisable(gl.CONSERVATIVE_RASTERIZATION_NV)
+
+
 @contextmanager
 def rasterising(device: Device) -> Iterator[None]:
     """Depth tests and clips at both sides of the window inside; off again whatever happens."""

@@ -118,6 +118,33 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("uint", "triangle"),  # within its batch
         ("uint", "row_sides"),  # row, and DOUBLE_SIDED above it
     ),
+    # A point of the paper's lattice: a cell of its triangle's lattice, u | v << 16.
+    "Cell": (
+        ("uint", "triangle"),  # within its batch
+        ("uint", "cell"),
+    ),
+    # The list of cells that was appended last: what dispatches the splatter, how many points there
+    # are (which may be more than the list holds), and the rows of the tallest where they exceed a
+    # strip.
+    "CellWork": (
+        ("uint", "splat_x"),
+        ("uint", "splat_y"),
+        ("uint", "splat_z"),
+        ("uint", "points"),
+        ("uint", "tallest"),
+    ),
+    # The most of both since the host last looked.
+    "CellNeeds": (
+        ("uint", "most_points"),
+        ("uint", "tallest"),
+    ),
+    # Pixels that points try, and those of them that they keep, 64 bits each.
+    "Pairs": (
+        ("uint", "tried_low"),
+        ("uint", "tried_high"),
+        ("uint", "kept_low"),
+        ("uint", "kept_high"),
+    ),
     # A light in world directions, told from the window's centre in shading's unit; also valid as
     # std140.
     "Light": (
@@ -148,6 +175,7 @@ CONSTANTS: dict[str, int] = {
     "TEXTURE_ROLES": len(TEXTURE_ROLES),
     "NO_TRIANGLE": 0xFFFFFFFF,  # the word of a view pixel that shows the background
     "DOUBLE_SIDED": 1 << 16,
+    "MOST_CELLS": 2048,  # of a triangle's lattice along a side, as the point-sampling view is large
     "UNLIT": 1,  # flag of a material
     "STUDIO": 1,  # kinds of environment
     "PICTURE": 2,

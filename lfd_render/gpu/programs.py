@@ -122,7 +122,7 @@ class Kernel(_Program):
 
 
 class RasterProgram(_Program):
-    """A vertex and a fragment shader."""
+    """A vertex and a fragment shader, with a geometry shader between them or without."""
 
     def __init__(
         self,
@@ -130,17 +130,24 @@ class RasterProgram(_Program):
         vertex_path: str,
         fragment_path: str,
         constants: Mapping[str, int | float] | None = None,
+        *,
+        geometry_path: str | None = None,
     ) -> None:
         vertex, fragment = assemble(vertex_path, constants), assemble(fragment_path, constants)
+        geometry = assemble(geometry_path, constants) if geometry_path else None
 
         def build(vertex_text: str) -> Any:
-            return device.context.program(vertex_shader=vertex_text, fragment_shader=fragment.text)
+            return device.context.program(
+                vertex_shader=vertex_text,
+                geometry_shader=geometry.text if geometry else None,
+                fragment_shader=fragment.text,
+            )
 
         super().__init__(
             device,
-            f"{vertex_path} + {fragment_path}",
-            vertex.text + fragment.text,
-            _compile(fragment, build, vertex.text),
+            " + ".join(path for path in (vertex_path, geometry_path, fragment_path) if path),
+            vertex.text + (geometry.text if geometry else "") + fragment.text,
+            _compile(fragment, build, vertex.text, {"vertex": vertex, "geometry": geometry}),
         )
 
     @property
@@ -149,8 +156,14 @@ class RasterProgram(_Program):
         return self._program
 
 
-def _compile(source: Source, build: Any, text: str) -> Any:
+def _compile(
+    source: Source, build: Any, text: str, stages: Mapping[str, Source | None] | None = None
+) -> Any:
+    """Build, and tell a failure in terms of the source, or of the stage that the message names."""
     try:
         return build(text)
     except moderngl.Error as error:
+        for stage, other in (stages or {}).items():
+            if other and f"{stage}_shader" in str(error):
+                source = other
         raise GpuError(f"shader '{source.path}': {source.explain(str(error))}") from None

@@ -56,6 +56,10 @@ LESS = 0x0201
 
 OUT_OF_MEMORY = 0x0505
 MAX_COMPUTE_SHADER_STORAGE_BLOCKS = 0x90DB
+MAX_GEOMETRY_SHADER_STORAGE_BLOCKS = 0x90D7
+FRAMEBUFFER_DEFAULT_WIDTH = 0x9310
+FRAMEBUFFER_DEFAULT_HEIGHT = 0x9311
+CONSERVATIVE_RASTERIZATION_NV = 0x9346
 GPU_MEMORY_INFO_DEDICATED_VIDMEM_NVX = 0x9047  # KiB
 
 ERRORS = {
@@ -90,6 +94,7 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "glGetTextureImage": (None, (_u, _i, _u, _u, _i, _p)),
     "glCreateFramebuffers": (None, (_i, _p)),
     "glDeleteFramebuffers": (None, (_i, _p)),
+    "glNamedFramebufferParameteri": (None, (_u, _u, _i)),
     "glCreateRenderbuffers": (None, (_i, _p)),
     "glDeleteRenderbuffers": (None, (_i, _p)),
     "glNamedRenderbufferStorage": (None, (_u, _u, _i, _i)),

@@ -106,6 +106,11 @@ class Batch:
         )
         self.corners = Buffer.of(device, "triangles", corners)
 
+    def corner_indices(self) -> NDArray[np.uint32]:
+        """Vertices of the triangles, [triangle, 3], for draws. Waits for the device."""
+        corners: NDArray[np.uint32] = self.corners.read(np.uint32)
+        return np.ascontiguousarray(corners.reshape(-1, 4)[:, :3])
+
     def geometry(self) -> dict[str, Buffer]:
         """What visibility reads, by block name (draws are the scene's)."""
         return {"Triangles": self.corners, "DisplayPositions": self.display_positions}

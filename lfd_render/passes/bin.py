@@ -9,7 +9,8 @@ from lfd_render.gpu.layout import dtype
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
-from lfd_render.passes.sample import GROUPS_ACROSS, ROWS_DISPATCH, PointCloud
+from lfd_render.passes.items import GROUPS_ACROSS, ROWS_DISPATCH
+from lfd_render.passes.sample import PointCloud
 from lfd_render.passes.view_target import Band, ViewTarget
 
 _HEADROOM = 1.25  # of the room for a bin over the longest found, as for the sampler's windows

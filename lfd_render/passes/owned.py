@@ -10,11 +10,23 @@ from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.bin import Bin
 from lfd_render.passes.sample import PointCloud
+from lfd_render.passes.sampling import DEFAULT_SAMPLING, Sampling
 from lfd_render.passes.splat import view_lanes
 from lfd_render.passes.view_buffers import ViewBuffers
 from lfd_render.passes.view_target import Band, ViewTarget
 
 MOST_ITERATIONS = 65535  # llvmpipe ends an invocation's loops here, nested ones counted together
+
+
+def column_loops(scene: SceneBuffers, *, tested: bool) -> int:
+    """Loop iterations of a column: one whose alpha is tested also looks for its texture's array,
+    twice, and takes one tap."""
+    return 2 + 2 * int(scene.constants()["SRGB_GROUPS"]) if tested else 1
+
+
+def iterations_left(each: int) -> int:
+    """How often an invocation may do what loops so many times, at least once."""
+    return max(1, MOST_ITERATIONS // each)
 
 
 class OwnedSplat:
@@ -23,18 +35,22 @@ class OwnedSplat:
     steps = range(1)
 
     def __init__(
-        self, device: Device, scene: SceneBuffers, target: ViewTarget, *, lod: str = "area"
+        self,
+        device: Device,
+        scene: SceneBuffers,
+        target: ViewTarget,
+        *,
+        lod: str = "area",
+        sampling: Sampling = DEFAULT_SAMPLING,
     ) -> None:
         """lod: one of LOD_RULES, for alpha."""
         self._scene = scene
         self._bin = Bin(device, scene, target)
         self._lanes = view_lanes(target.rig.views)
-        constants = {**scene.constants(), **lod_constants(lod)}
-        # A column of a tested row also looks for its texture's array, twice, and takes one tap.
-        column_loops = {False: 1, True: 2 + 2 * int(constants["SRGB_GROUPS"])}
+        constants = {**scene.constants(), **lod_constants(lod), **sampling.constants()}
         tested = {batch.alpha_mode != "opaque" for batch in scene.batches}
         self._bin_items = {
-            key: max(1, MOST_ITERATIONS // (target.grid.columns * column_loops[key] + 2))
+            key: iterations_left(target.grid.columns * column_loops(scene, tested=key) + 2)
             for key in tested
         }
         self._kernels = {

@@ -59,8 +59,7 @@ class RasterForward:
         self._indices: list[Buffer] = []
         self._draws: list[IndexedDraws] = []
         for batch in scene.batches:
-            corners = batch.corners.read(np.uint32).reshape(-1, 4)[:, :3]
-            self._indices.append(Buffer.of(device, "indices", corners))
+            self._indices.append(Buffer.of(device, "indices", batch.corner_indices()))
             program = self._programs[batch.alpha_mode]
             self._draws.append(IndexedDraws(device, program, self._indices[-1]))
 

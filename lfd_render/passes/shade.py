@@ -11,10 +11,13 @@ from lfd_render.gpu.layout import dtype, lod_constants
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
+from lfd_render.passes.items import GROUPS_ACROSS
 from lfd_render.passes.placement import Placement, gl_matrix
-from lfd_render.passes.sample import GROUPS_ACROSS
+from lfd_render.passes.sampling import DEFAULT_SAMPLING, Points, Sampling
 from lfd_render.passes.view_buffers import ViewBuffers
 from lfd_render.passes.view_target import Band, ViewTarget
+
+Sampled = tuple[Batch, Points]
 
 BLOCK = 16  # columns of a view shaded together
 GROUP_BLOCKS = 4  # blocks of a work group
@@ -33,6 +36,7 @@ class Shade:
         word_stride: int,
         *,
         lod: str = "area",
+        sampling: Sampling = DEFAULT_SAMPLING,
     ) -> None:
         """lod: one of LOD_RULES."""
         constants = {
@@ -43,6 +47,7 @@ class Shade:
             **scene.constants(),
             **scene.lighting.constants(),
             **lod_constants(lod),
+            **sampling.constants(),
         }
         self._scene = scene
         self._list = Kernel(device, "shade/blocks.comp", constants)
@@ -56,16 +61,16 @@ class Shade:
         self._no_work["groups_z"] = 1
 
     def opaque(
-        self, batches: Sequence[Batch], band: Band, views: ViewBuffers, placement: Placement
+        self, batches: Sequence[Sampled], band: Band, views: ViewBuffers, placement: Placement
     ) -> None:
-        """Shade a band over the background."""
+        """Shade a band over the background. batches: each with the points it was sampled by."""
         images = band.target.images
         images.clear((*placement.background, 0.0))
         images.bind_image(0)
         self._run(self._opaque, batches, band, views, placement)
 
     def blend(
-        self, batches: Sequence[Batch], band: Band, views: ViewBuffers, placement: Placement
+        self, batches: Sequence[Sampled], band: Band, views: ViewBuffers, placement: Placement
     ) -> None:
         """Lay the blended surfaces that `views` now names over the band's images."""
         band.target.images.bind_image(0, writeonly=False)
@@ -74,13 +79,13 @@ class Shade:
     def _run(
         self,
         kernel: Kernel,
-        batches: Sequence[Batch],
+        batches: Sequence[Sampled],
         band: Band,
         views: ViewBuffers,
         placement: Placement,
     ) -> None:
         turn_from_display = gl_matrix(placement.turn_from_display)
-        for batch in batches:
+        for batch, points in batches:
             shared = {
                 "FrameBlock": band.frame(batch),
                 "Words": views.words,
@@ -99,6 +104,7 @@ class Shade:
                     "Draws": self._scene.draws,
                     "Eyes": band.target.eyes,
                     "RowOffsets": band.target.row_offsets,
+                    "PointSizes": points.sizes,
                 },
                 {"turn_from_display": turn_from_display, "row_blocks": self._row_blocks},
                 {**self._scene.samplers(), **self._scene.lighting.samplers()},

@@ -11,7 +11,9 @@ from lfd_render.gpu.layout import dtype, lod_constants
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
-from lfd_render.passes.sample import GROUP_ROWS, GROUPS_ACROSS, PointCloud
+from lfd_render.passes.items import GROUP_ROWS, GROUPS_ACROSS
+from lfd_render.passes.sample import PointCloud
+from lfd_render.passes.sampling import DEFAULT_SAMPLING, Sampling
 from lfd_render.passes.view_buffers import ViewBuffers
 from lfd_render.passes.view_target import Band, ViewTarget
 
@@ -37,6 +39,7 @@ class Splat:
         general: bool = False,
         int64: bool = False,
         lod: str = "area",
+        sampling: Sampling = DEFAULT_SAMPLING,
     ) -> None:
         """general: by each view's matrix instead of the shear that parallel views share.
 
@@ -50,15 +53,10 @@ class Splat:
             "GROUPS_ACROSS": GROUPS_ACROSS,
             **scene.constants(),
             **lod_constants(lod),
+            **sampling.constants(),
         }
         self._scene = scene
-        self._projection: dict[str, Buffer] = {}
-        if general:
-            matrices, shifts = pixel_matrices(target.rig, target.grid)
-            self._projection = {
-                "PixelMatrices": Buffer.of(device, "rig", matrices),
-                "RowShifts": Buffer.of(device, "rig", shifts),
-            }
+        self._projection = projection_buffers(device, target) if general else {}
         self._kernels = {
             (step, tested): Kernel(
                 device, path, {**constants, "STEP": step, "ALPHA_TESTED": int(tested)}
@@ -88,8 +86,7 @@ class Splat:
                 **views.blocks(),
                 "Draws": self._scene.draws,
                 "FrameBlock": band.frame(batch),
-                "PointRows": points.rows,
-                "WorkBlock": points.work,
+                **points.splat_blocks(),
                 "Eyes": band.target.eyes,
                 "RowOffsets": band.target.row_offsets,
             },
@@ -108,6 +105,15 @@ class Splat:
             kernel.release()
         for buffer in self._projection.values():
             buffer.release()
+
+
+def projection_buffers(device: Device, target: ViewTarget) -> dict[str, Buffer]:
+    """What the general projection reads of a rig, by block name."""
+    matrices, shifts = pixel_matrices(target.rig, target.grid)
+    return {
+        "PixelMatrices": Buffer.of(device, "rig", matrices),
+        "RowShifts": Buffer.of(device, "rig", shifts),
+    }
 
 
 def pixel_matrices(rig: Rig, grid: ViewGrid) -> tuple[NDArray[np.float32], NDArray[np.int32]]:

@@ -12,7 +12,7 @@ from lfd_render.gpu.device import Device
 from lfd_render.gpu.layout import CONSTANTS
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
-from lfd_render.passes.sample import GROUPS_ACROSS
+from lfd_render.passes.items import GROUPS_ACROSS
 from lfd_render.passes.view_target import ViewTarget
 
 INT64_ATOMICS = "GL_NV_shader_atomic_int64"
@@ -21,12 +21,12 @@ _FARTHEST = 0x7F800000  # +∞ as a float's bits
 _GROUP = 64  # local_size_x of splat/forget.comp
 
 
-def choose_winners(device: Device, wanted: str, *, general: bool = False) -> str:
+def choose_winners(device: Device, wanted: str, *, ownable: bool = True) -> str:
     """What a member of WINNERS comes to on a device: int64, two-pass or owned.
 
     auto: 64-bit atomics where there are some; else owned rows on software devices, where they take
-    0.4 to 0.6 of two passes' time (docs/performance.md); else two passes. general: views do not
-    share rows, so none can be owned. Raises GpuError for 64-bit atomics where there are none.
+    0.4 to 0.6 of two passes' time (docs/performance.md); else two passes. ownable: points come in
+    rows that all views share. Raises GpuError for 64-bit atomics where there are none.
     """
     assert wanted in WINNERS
     has_int64 = INT64_ATOMICS in device.info.extensions
@@ -39,7 +39,7 @@ def choose_winners(device: Device, wanted: str, *, general: bool = False) -> str
         return wanted
     if has_int64:
         return "int64"
-    return "owned" if device.info.software and not general else "two-pass"
+    return "owned" if device.info.software and ownable else "two-pass"
 
 
 class ViewBuffers(Protocol):

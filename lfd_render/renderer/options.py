@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from lfd_render.display.model import Spacing
 from lfd_render.errors import UsageError
 from lfd_render.gpu.layout import LOD_RULES
+from lfd_render.passes.sampling import (
+    CULLINGS,
+    DEFAULT_SAMPLING,
+    DENSITIES,
+    LATTICES,
+    PAPER_SAMPLING,
+    POINT_SOURCES,
+    SHADE_PLACES,
+    Sampling,
+)
 from lfd_render.passes.view_buffers import WINNERS
 from lfd_render.scene import Environment
 
@@ -29,7 +40,10 @@ class RenderOptions:
     by work groups that own their pixels, with the same picture; auto: what suits the device.
     environment: the built-in studio, none, or a picture, turned about the world's +y,
     counter-clockwise seen from above, and scaled.
-    lod: how textures are filtered, one of LOD_RULES; None: as the preset has it (`lod_rule`)."""
+    lod: how textures are filtered, one of LOD_RULES; None: as the preset has it (`lod_rule`).
+    lattice, point_source, density, texture_limit, culling, stochastic_culling, shade: the ideas of
+    LFDPR, each as `Sampling` says; None: as the preset has them (`sampling`).
+    effort: count what points try and keep in the last frame, which takes about a frame's time."""
 
     views: int | None = None
     view_size: tuple[int, int] | None = None
@@ -46,6 +60,14 @@ class RenderOptions:
     environment_turn_rad: float = 0.0
     environment_intensity: float = 1.0
     lod: str | None = None
+    lattice: str | None = None
+    point_source: str | None = None
+    density: str | None = None
+    texture_limit: bool | None = None
+    culling: str | None = None
+    stochastic_culling: bool | None = None
+    shade: str | None = None
+    effort: bool = False
 
     def __post_init__(self) -> None:
         """Check ranges; raises UsageError."""
@@ -54,12 +76,18 @@ class RenderOptions:
             ("preset", self.preset, PRESETS),
             ("projection", self.projection, PROJECTIONS),
             ("lod", self.lod_rule, LOD_RULES),
+            ("lattice", self.sampling.lattice, LATTICES),
+            ("point source", self.sampling.source, POINT_SOURCES),
+            ("density", self.sampling.density, DENSITIES),
+            ("culling", self.sampling.culling, CULLINGS),
+            ("shade", self.sampling.shade, SHADE_PLACES),
         ):
             if choice not in choices:
                 raise UsageError(f"{name} '{choice}': unknown; use {' or '.join(choices)}")
         if self.lod == "multiview" and self.technique == "mvr":
             others = " or ".join(rule for rule in LOD_RULES if rule != "multiview")
             raise UsageError(f"lod 'multiview': mvr has no points that views share; use {others}")
+        self._check_sampling()
         self._check_splat()
         if self.views is not None and not _whole(self.views, MOST_VIEWS):
             raise UsageError(f"views: {self.views!r} is out of range; use 1 to {MOST_VIEWS}")
@@ -105,6 +133,50 @@ class RenderOptions:
             return "long-axis" if self.technique == "mvr" else "multiview"
         return "anisotropic"
 
+    @property
+    def sampling(self) -> Sampling:
+        """The preset's sampling, with what was chosen apart from it."""
+        preset = PAPER_SAMPLING if self.preset == "paper" else DEFAULT_SAMPLING
+        if self.lattice == "rows" and self.point_source is None:
+            preset = replace(preset, source="compute")  # the only one that rows have
+        elif self.point_source == "raster" and self.lattice is None:
+            preset = replace(preset, lattice="paper")
+        chosen: dict[str, Any] = {
+            "lattice": self.lattice,
+            "source": self.point_source,
+            "density": self.density,
+            "texture_limit": self.texture_limit,
+            "culling": self.culling,
+            "stochastic_culling": self.stochastic_culling,
+            "shade": self.shade,
+        }
+        return replace(preset, **{k: v for k, v in chosen.items() if v is not None})
+
+    def _check_sampling(self) -> None:
+        sampling = self.sampling
+        if sampling.source == "raster" and sampling.lattice == "rows":
+            raise UsageError(
+                "point source 'raster': rows are cut in compute; use it with lattice 'paper'"
+            )
+        if self.projection == "general" and sampling.lattice == "paper":
+            raise UsageError(
+                "projection 'general': cells of lattice 'paper' are splatted by the shear; use it "
+                "with lattice 'rows'"
+            )
+        given = [
+            name
+            for name in (
+                "lattice", "point_source", "density", "texture_limit", "culling",
+                "stochastic_culling", "shade",
+            )
+            if getattr(self, name) is not None
+        ]  # fmt: skip
+        if given and self.technique != "lfdpr":
+            raise UsageError(
+                f"{given[0].replace('_', ' ')} {getattr(self, given[0])!r}: technique "
+                f"'{self.technique}' has no points; use it with lfdpr"
+            )
+
     def _check_splat(self) -> None:
         if self.splat not in WINNERS:
             raise UsageError(f"splat '{self.splat}': unknown; use {', '.join(WINNERS)}")
@@ -112,6 +184,11 @@ class RenderOptions:
             raise UsageError(
                 "splat 'owned': needs projection 'shear', whose views share their rows; "
                 "with 'general' use auto"
+            )
+        if self.splat == "owned" and self.sampling.lattice == "paper":
+            raise UsageError(
+                "splat 'owned': cells of lattice 'paper' lie on no rows; use auto, two-pass or "
+                "int64"
             )
         if self.splat != "auto" and self.technique != "lfdpr":
             raise UsageError(

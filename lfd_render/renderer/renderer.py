@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from types import TracebackType
 from typing import Any
 
@@ -118,8 +119,7 @@ class Renderer:
             "view_size": [grid.columns, grid.rows],
             "view_grid": grid.kind,
             "triangles": scene.triangle_count,
-            "points": frames.technique.count_points(),
-            "splat": frames.technique.winners,
+            **_point_report(frames.technique, choice),
             "renderer": self.device.name,
             "device_bytes": self.device.ledger.peak,
             "warnings": list(buffers.warnings),
@@ -255,11 +255,24 @@ class Renderer:
             self.device,
             buffers,
             target,
-            stochastic_culling=choice.preset == "paper",
+            sampling=choice.sampling,
             general=choice.projection == "general",
             winners=choice.splat,
             lod=choice.lod_rule,
         )
+
+
+def _point_report(technique: Technique, choice: RenderOptions) -> dict[str, Any]:
+    """What the report says of points: how they were made, how many, and what they took."""
+    if choice.technique != "lfdpr":
+        return {"points": 0, "splat": None}
+    sampling = asdict(choice.sampling)
+    report = {"point_source": sampling.pop("source"), **sampling, "splat": technique.winners}
+    if not choice.effort:
+        return {"points": technique.count_points(), **report}
+    effort = technique.effort()
+    per_pixel = effort.pairs_tried / max(effort.visible_pixels, 1)
+    return {**asdict(effort), "pairs_per_visible_pixel": round(per_pixel, 3), **report}
 
 
 def camera_for(scene: Scene, display: DisplayProfile) -> Camera:

@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 from lfd_render.gpu.clock import StageClock
 from lfd_render.passes.placement import Placement
 from lfd_render.passes.view_target import Band, ViewTarget
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What a frame took. pairs_tried: pixels that points tried in the views that their triangles
+    face, at least one for each point and view (for each row of points and view, where rows are
+    what is splatted); pairs_kept: those inside their triangle and opaque; visible_pixels: of all
+    views, blended ones counted apart."""
+
+    points: int = 0
+    pairs_tried: int = 0
+    pairs_kept: int = 0
+    visible_pixels: int = 0
 
 
 class Technique(Protocol):
@@ -36,6 +50,10 @@ class Technique(Protocol):
 
     def count_points(self) -> int:
         """Points of a whole frame at the last placement; 0 where there are none."""
+        ...
+
+    def effort(self) -> Effort:
+        """What a frame at the last placement takes; nothing where there are no points."""
         ...
 
     def release(self) -> None:

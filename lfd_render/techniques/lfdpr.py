@@ -1,18 +1,32 @@
-"""Light field display point rendering (Gavane and Watson 2024), generated in compute."""
+"""Light field display point rendering (Gavane and Watson 2024), generated in compute by default."""
 
 from __future__ import annotations
 
+from functools import partial
+
+import numpy as np
+
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
+from lfd_render.gpu.layout import CONSTANTS
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
+from lfd_render.passes.cells import SampleCells
 from lfd_render.passes.owned import OwnedSplat
+from lfd_render.passes.pairs import CountPairs
 from lfd_render.passes.placement import Placement
+from lfd_render.passes.raster_cells import RasterCells
 from lfd_render.passes.sample import PointCloud, Sample
+from lfd_render.passes.sampling import DEFAULT_SAMPLING, Points, PointSource, Sampling, Splatter
 from lfd_render.passes.shade import Shade
 from lfd_render.passes.splat import Splat, view_lanes
+from lfd_render.passes.splat_cells import SplatCells
 from lfd_render.passes.transform import Transform
 from lfd_render.passes.view_buffers import choose_winners, make_view_buffers
 from lfd_render.passes.view_target import Band, ViewTarget
+from lfd_render.techniques.base import Effort
+
+SOURCES = {"compute": SampleCells, "raster": RasterCells}  # of the paper's lattice
+_MOST_ROUNDS = 32  # of learning; windows halve in each
 
 
 class Lfdpr:
@@ -27,36 +41,48 @@ class Lfdpr:
         scene: SceneBuffers,
         target: ViewTarget,
         *,
-        stochastic_culling: bool = False,
+        sampling: Sampling = DEFAULT_SAMPLING,
         general: bool = False,
         winners: str = "auto",
         lod: str = "area",
     ) -> None:
         """general: splat by each view's matrix instead of the shear that parallel views share.
 
-        winners: how they are found, of WINNERS; owned needs the shear. Raises GpuError where the
-        device cannot.
+        winners: how they are found, of WINNERS; owned needs the shear and rows. Raises GpuError
+        where the device cannot.
 
         lod: how textures are filtered, one of LOD_RULES.
         """
-        self.winners = choose_winners(device, winners, general=general)
-        int64, owned = self.winners == "int64", self.winners == "owned"
-        assert not (owned and general)
-        lanes = view_lanes(target.rig.views)
+        cells = sampling.lattice == "paper"
+        self.winners = choose_winners(device, winners, ownable=not (general or cells))
+        int64 = self.winners == "int64"
         self.target = target
         self._scene = scene
         self._transform = Transform(device)
-        self._sample = Sample(
-            device, scene, lanes, stochastic_culling=stochastic_culling, whole_rows=general
+        self._source: PointSource = (
+            SOURCES[sampling.source](device, scene, target, sampling)
+            if cells
+            else Sample(
+                device, scene, view_lanes(target.rig.views), sampling=sampling, whole_rows=general
+            )
         )
-        self._splat = (
-            OwnedSplat(device, scene, target, lod=lod)
-            if owned
-            else Splat(device, scene, target, general=general, int64=int64, lod=lod)
+        self._splat: Splatter = (
+            SplatCells(device, scene, target, sampling, int64=int64, lod=lod)
+            if cells
+            else OwnedSplat(device, scene, target, lod=lod, sampling=sampling)
+            if self.winners == "owned"
+            else Splat(
+                device, scene, target, general=general, int64=int64, lod=lod, sampling=sampling
+            )
         )
         self._views = make_view_buffers(device, target, int64=int64)
-        self._shade = Shade(device, scene, target, self._views.word_stride, lod=lod)
-        self._points = [self._sample.allocate(batch) for batch in scene.batches]
+        self._shade = Shade(
+            device, scene, target, self._views.word_stride, lod=lod, sampling=sampling
+        )
+        self._points: list[Points] = [self._source.allocate(batch) for batch in scene.batches]
+        self._make_counter = partial(
+            CountPairs, device, scene, target, sampling, general=general, lod=lod
+        )
 
     def begin(self, placement: Placement, clock: StageClock) -> None:
         """Place the scene and transform its vertices."""
@@ -69,63 +95,91 @@ class Lfdpr:
     def warm_up(self, clock: StageClock) -> None:
         """Render one row, and sample all bands to learn how many points there are."""
         self.render(self.target.warm_up_band, clock)
-        for band in self.target.bands:
-            for batch, points in self._batches():
-                self._sample(batch, points, band)
-        self.complete()
-        if isinstance(self._splat, OwnedSplat):  # bins are whole now that the windows are
+        # Rows are counted in one round and bins of rows in a second; lists of cells, whose windows
+        # may have to be halved, take as many as it takes.
+        owned, rows = isinstance(self._splat, OwnedSplat), isinstance(self._source, Sample)
+        for _ in range(1 + owned if rows else _MOST_ROUNDS):
             for band in self.target.bands:
                 for batch, points in self._batches():
-                    self._sample(batch, points, band)
-                    for window in range(points.windows):
-                        self._sample.rows(batch, points, band, window)
-                        self._splat.bin(batch, points, window=window, band=band)
-            self.complete()
+                    self._source(batch, points, band)
+                    for window in range(points.windows if owned or not rows else 0):
+                        self._source.fill(batch, points, band, window)
+                        if isinstance(self._splat, OwnedSplat):
+                            assert isinstance(points, PointCloud)
+                            self._splat.bin(batch, points, window=window, band=band)
+            if self.complete():
+                break
 
     def render(self, band: Band, clock: StageClock) -> None:
         """Sample, splat and shade one band of rows."""
         with clock.stage("sample"):
             for batch, points in self._batches():
-                self._sample(batch, points, band)
+                self._source(batch, points, band)
                 if points.windows == 1:
-                    self._sample.rows(batch, points, band, 0)
+                    self._source.fill(batch, points, band, 0)
         solid = [pair for pair in self._batches() if pair[0].alpha_mode != "blend"]
         with clock.stage("splat"):
             self._views.clear()
             self._find_winners(solid, band)
         with clock.stage("shade"):
-            batches = [batch for batch, _ in solid]
-            self._shade.opaque(batches, band, self._views, self._placement)
+            self._shade.opaque(solid, band, self._views, self._placement)
         blended = [pair for pair in self._batches() if pair[0].alpha_mode == "blend"]
         if blended:
             with clock.stage("blend"):
                 self._views.clear_words()
                 self._find_winners(blended, band)
-                batches = [batch for batch, _ in blended]
-                self._shade.blend(batches, band, self._views, self._placement)
+                self._shade.blend(blended, band, self._views, self._placement)
 
-    def _find_winners(self, batches: list[tuple[Batch, PointCloud]], band: Band) -> None:
+    def _find_winners(self, batches: list[tuple[Batch, Points]], band: Band) -> None:
         for step in self._splat.steps:
             for batch, points in batches:
                 for window in range(points.windows):
                     if points.windows > 1:
-                        self._sample.rows(batch, points, band, window)
+                        self._source.fill(batch, points, band, window)
                     self._splat(step, batch, points, window=window, band=band, views=self._views)
 
     def complete(self) -> bool:
         """Whether there was room for all points since the last call; if not, there is now."""
-        enlarged = [self._sample.fit(points) for points in self._points] + [self._splat.fit()]
+        enlarged = [self._source.fit(points) for points in self._points] + [self._splat.fit()]
         return not any(enlarged)
 
     def count_points(self) -> int:
         """Points of all bands at the last placement. Samples again, outside any timing."""
         return sum(
-            self._sample.count(batch, points, band)
+            self._source.count(batch, points, band)
             for band in self.target.bands
             for batch, points in self._batches()
         )
 
-    def _batches(self) -> list[tuple[Batch, PointCloud]]:
+    def effort(self) -> Effort:
+        """What a frame at the last placement takes. Samples and splats again, outside any
+        timing."""
+        counter = self._make_counter()
+        tried = kept = visible = 0
+        for band in self.target.bands:
+            for batch, points in self._batches():
+                self._source(batch, points, band)
+                for window in range(points.windows):
+                    self._source.fill(batch, points, band, window)
+                    pairs = counter(batch, points, band, window)
+                    tried, kept = tried + pairs[0], kept + pairs[1]
+            self._views.clear()
+            for blended in (False, True):
+                layer = [p for p in self._batches() if (p[0].alpha_mode == "blend") == blended]
+                self._views.clear_words()
+                self._find_winners(layer, band)
+                visible += self._visible_pixels(band)
+        counter.release()
+        return Effort(self.count_points(), tried, kept, visible)
+
+    def _visible_pixels(self, band: Band) -> int:
+        """Pixels that the layer splatted last shows."""
+        pixels = band.rows * self.target.rig.views * self.target.grid.columns
+        words = self._views.words.read(np.uint32, self._views.word_stride * pixels)
+        ids = words[:: self._views.word_stride]
+        return int(np.count_nonzero(ids != CONSTANTS["NO_TRIANGLE"]))
+
+    def _batches(self) -> list[tuple[Batch, Points]]:
         return list(zip(self._scene.batches, self._points, strict=True))
 
     def release(self) -> None:
@@ -133,7 +187,7 @@ class Lfdpr:
         for points in self._points:
             points.release()
         self._transform.release()
-        self._sample.release()
+        self._source.release()
         self._splat.release()
         self._shade.release()
         self._views.release()

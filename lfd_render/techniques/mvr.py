@@ -9,6 +9,7 @@ from lfd_render.passes.placement import Placement
 from lfd_render.passes.raster import RasterForward
 from lfd_render.passes.transform import Transform
 from lfd_render.passes.view_target import Band, ViewTarget
+from lfd_render.techniques.base import Effort
 
 
 class Mvr:
@@ -53,6 +54,10 @@ class Mvr:
     def count_points(self) -> int:
         """Rasterisation has no points."""
         return 0
+
+    def effort(self) -> Effort:
+        """Rasterisation has no points."""
+        return Effort()
 
     def release(self) -> None:
         """Free passes and target."""

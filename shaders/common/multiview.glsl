@@ -5,7 +5,7 @@
 
 #include "common/triangles.glsl"
 #include "common/plane.glsl"
-#include "sample/density.glsl"
+#include "shade/point.glsl"
 
 // Least of sign·side over the views where it is above 0: an extreme eye's, or, if the side changes sign
 // between the extremes, that of the last eye before. Infinite if there is none.
@@ -31,7 +31,7 @@ float least_side(Plane plane, float sign) {
 }
 
 // As Footprint.views.
-vec3 footprint_views(uvec4 triangle, Plane plane, float eye_mm, uint facing) {
+vec3 footprint_views(uint triangle, Plane plane, float eye_mm, uint facing) {
     float first = eye_side(plane, frame.eye_first * frame.column_mm);
     float last = eye_side(plane, frame.eye_last * frame.column_mm);
     float side = eye_side(plane, eye_mm), sign = side < 0.0 ? -1.0 : 1.0;
@@ -45,9 +45,9 @@ vec3 footprint_views(uvec4 triangle, Plane plane, float eye_mm, uint facing) {
     float own = abs(side), smallest = own / max(most, max(own, 1e-30));
     float largest = clamp(own / max(min(least, own), 1e-30), 1.0, 1e12);
 
-    // Equation 8: a splat no smaller than this view's pixel, of point_columns densest pixels.
+    // Equation 8: a splat no smaller than this view's pixel, of so many densest pixels.
     float densest = max(abs(first), abs(last));
-    float splat = own / max(densest, 1e-30) * point_columns(triangle, plane, densest);
+    float splat = own / max(densest, 1e-30) * densest_pixels_of(triangle, plane);
     float used = clamp(max(1.0, splat), smallest, largest);
     return vec3(smallest, largest, largest > smallest ? (used - smallest) / (largest - smallest) : 0.0);
 }

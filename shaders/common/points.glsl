@@ -3,19 +3,10 @@
 // Points own half-open cells, so that in every view their footprints, cut to the triangle, abut, and
 // the row's footprint is the one interval between the slice's ends.
 
-#include "common/shear.glsl"
-#include "layout/PointRow"
+#include "common/slices.glsl"
 #include "layout/Work"
 
 layout(std430) readonly restrict buffer PointRows { PointRow point_rows[]; };
 layout(std430) readonly restrict buffer WorkBlock { Work work[]; };
 
 uniform int window;
-
-Slice slice_of(PointRow points) {
-    return Slice(SliceEnd(points.a_column, points.a_k), SliceEnd(points.b_column, points.b_k), true);
-}
-
-int row_of(PointRow points) {
-    return int(points.row_sides & 0xFFFFu);
-}

@@ -25,6 +25,11 @@ float depth_of(vec3 p_display) {
     return frame.distance_mm - p_display.z;
 }
 
+// Row coordinate (top of the window 0, row centres at halves) of a point.
+float row_from(vec3 p) {
+    return (0.5 * frame.panel_height_mm - p.y * frame.distance_mm / depth_of(p)) / frame.row_mm;
+}
+
 // ≥ 0 for points that appear on the row's centre line or above it; linear in the point, so that its
 // zero on an edge is where the edge crosses the row, also behind the eyes.
 float above_row(vec3 p_display, float row_y) {
@@ -72,11 +77,12 @@ vec2 clip_slice(vec3 p, vec3 q) {
     float half_width = 0.5 * frame.panel_width_mm + 2.0 * frame.column_mm;
     vec2 eyes = vec2(frame.eye_first, frame.eye_last) * frame.column_mm;
     // x_window·d = D·X + (d − D)·s, so the frustum's planes are linear in the point.
-    vec2 x_p = frame.distance_mm * p.x - p.z * eyes;
-    vec2 x_q = frame.distance_mm * q.x - q.z * eyes;
+    precise vec2 x_p = frame.distance_mm * p.x - p.z * eyes;
+    precise vec2 x_q = frame.distance_mm * q.x - q.z * eyes;
     float d_p = depth_of(p), d_q = depth_of(q);
-    vec2 left = seen_by_either(x_p + half_width * d_p, x_q + half_width * d_q);
-    vec2 right = seen_by_either(half_width * d_p - x_p, half_width * d_q - x_q);
+    precise vec2 left_p = half_width * d_p + x_p, left_q = half_width * d_q + x_q;
+    precise vec2 right_p = half_width * d_p - x_p, right_q = half_width * d_q - x_q;
+    vec2 left = seen_by_either(left_p, left_q), right = seen_by_either(right_p, right_q);
     return vec2(max(ends.x, max(left.x, right.x)), min(ends.y, min(left.y, right.y)));
 }
 
@@ -105,7 +111,8 @@ Slice slice_triangle(vec3 a, vec3 b, vec3 c, int row, float row_offset) {
     vec2 part = clip_slice(p, q);
     slice.exists = part.x < part.y;
     vec3 along = q - p;
-    slice.a = slice_end(part.x > 0.0 ? p + part.x * along : p, row_offset);
-    slice.b = slice_end(part.y < 1.0 ? p + part.y * along : q, row_offset);
+    precise vec3 cut_a = p + part.x * along, cut_b = p + part.y * along;
+    slice.a = slice_end(part.x > 0.0 ? cut_a : p, row_offset);
+    slice.b = slice_end(part.y < 1.0 ? cut_b : q, row_offset);
     return slice;
 }

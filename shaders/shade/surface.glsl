@@ -46,13 +46,12 @@ Surface surface_at(uint triangle, int view, int row, int column) {
     vec3 b = display_positions[corners.y].xyz;
     vec3 c = display_positions[corners.z].xyz;
     float eye_mm = eyes[view] * frame.column_mm;
-    float x_mm = (float(column) + 0.5 - row_offsets[row]) * frame.column_mm;
     Plane plane = triangle_plane(a, b, c);
-    Hit hit = hit_triangle(a, b, c, plane, eye_mm, x_mm, row_centre_mm(row));
+    Hit hit = shaded_hit(triangle, a, b, c, plane, eye_mm, row, column);
     mat3x2 uv0 = mat3x2(tex_coords[corners.x], tex_coords[corners.y], tex_coords[corners.z]);
     mat3x2 uv1 = mat3x2(vertex_uv1(corners.x), vertex_uv1(corners.y), vertex_uv1(corners.z));
     uint facing = draws[corners.w].facing;
-    vec3 views = LOD_RULE == LOD_MULTIVIEW ? footprint_views(corners, plane, eye_mm, facing) : ONE_VIEW;
+    vec3 views = LOD_RULE == LOD_MULTIVIEW ? footprint_views(triangle, plane, eye_mm, facing) : ONE_VIEW;
 
     Surface surface;
     surface.to_eye = mat3(turn_from_display) * (vec3(eye_mm, 0.0, frame.distance_mm) - hit.p_display);

@@ -4,4 +4,4 @@
 layout(local_size_x = VIEW_LANES) in;
 
 #include "splat/visit.glsl"
-#include "splat/general.glsl"
+#include "splat/general_groups.glsl"

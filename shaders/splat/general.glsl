@@ -82,8 +82,10 @@ void splat_row(PointRow points, int view) {
 
     uint facing = draws[corners.w].facing;
     uint id = frame.triangle_base + points.triangle;
+    int boxed = 0;
     for (int row = max(frame.band_first, box.y); row < min(frame.band_first + frame.band_rows, box.w); row++) {
         int shift = row_shifts[row];
+        boxed += max(min(frame.columns, box.z - shift) - max(0, box.x - shift), 0);
         for (int column = max(0, box.x - shift); column < min(frame.columns, box.z - shift); column++) {
             vec2 centre = vec2(float(column + shift), float(row)) + 0.5;
             precise vec2 pa = a.xy - centre * a.z, pb = b.xy - centre * b.z, pc = c.xy - centre * c.z;
@@ -98,12 +100,5 @@ void splat_row(PointRow points, int view) {
             visit(view_pixel(row, view, column), depth, id);
         }
     }
-}
-
-void main() {
-    uint first = (gl_WorkGroupID.y * GROUPS_ACROSS + gl_WorkGroupID.x) * GROUP_ROWS;
-    int view = int(gl_WorkGroupID.z * VIEW_LANES + gl_LocalInvocationID.x);
-    if (view >= frame.views) return;
-    for (uint place = first; place < min(first + GROUP_ROWS, work[window].items); place++)
-        splat_row(point_rows[place], view);
+    tried(uint(max(boxed, 1)));
 }

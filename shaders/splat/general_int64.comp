@@ -7,4 +7,4 @@
 layout(local_size_x = VIEW_LANES) in;
 
 #include "splat/visit_int64.glsl"
-#include "splat/general.glsl"
+#include "splat/general_groups.glsl"

@@ -10,3 +10,5 @@ void visit(uint pixel, float depth, uint id) {
     if (STEP == 0) atomicMin(depths[pixel], bits);
     else if (depths[pixel] == bits) atomicMin(words[pixel], id);
 }
+
+void tried(uint pixels) {}  // counted by splat/visit_count.glsl

@@ -6,3 +6,5 @@ layout(std430) restrict buffer Winners { uint64_t winners[]; };
 void visit(uint pixel, float depth, uint id) {
     atomicMin(winners[pixel], packUint2x32(uvec2(id, floatBitsToUint(depth))));
 }
+
+void tried(uint pixels) {}  // counted by splat/visit_count.glsl

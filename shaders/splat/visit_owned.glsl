@@ -10,3 +10,5 @@ void visit(uint pixel, float depth, uint id) {
     depths[pixel] = bits;
     words[pixel] = id;
 }
+
+void tried(uint pixels) {}  // counted by splat/visit_count.glsl

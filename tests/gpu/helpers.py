@@ -21,6 +21,7 @@ from lfd_render.passes.owned import OwnedSplat
 from lfd_render.passes.placement import Placement
 from lfd_render.passes.prefilter import Prefilter
 from lfd_render.passes.sample import Sample
+from lfd_render.passes.sampling import Sampling
 from lfd_render.passes.shade import Shade
 from lfd_render.passes.splat import Splat, view_lanes
 from lfd_render.passes.transform import Transform
@@ -267,10 +268,10 @@ class Passes:
             device,
             self.buffers,
             view_lanes(rig.views),
-            stochastic_culling=stochastic_culling,
+            sampling=Sampling(stochastic_culling=stochastic_culling),
             whole_rows=general,
         )
-        chosen = choose_winners(device, winners, general=general)
+        chosen = choose_winners(device, winners, ownable=not general)
         self.int64 = chosen == "int64"
         self.splat = (
             OwnedSplat(device, self.buffers, self.target, lod=lod)
@@ -297,7 +298,7 @@ class Passes:
                 for batch, points in self.batches:
                     self.sample(batch, points, band)
                     for window in range(points.windows):
-                        self.sample.rows(batch, points, band, window)
+                        self.sample.fill(batch, points, band, window)
                         self.splat.bin(batch, points, window=window, band=band)
             self.splat.fit()
 
@@ -326,7 +327,7 @@ class Passes:
                 self.sample(batch, points, band)
                 length = points.spans.read(dtype("Span"))["point_columns"]
                 for window in range(points.windows):
-                    self.sample.rows(batch, points, band, window)
+                    self.sample.fill(batch, points, band, window)
                     count = int(points.work.read(dtype("Work"))[window]["items"])
                     rows = points.rows.read(dtype("PointRow"))[:count].copy()
                     lengths.append(length[rows["triangle"]])
@@ -368,11 +369,11 @@ class Passes:
         for step in self.splat.steps:
             for batch, points in pairs:
                 for window in range(points.windows):
-                    self.sample.rows(batch, points, band, window)
+                    self.sample.fill(batch, points, band, window)
                     self.splat(step, batch, points, window=window, band=band, views=self.views)
         if shaded:
             shade = self.shade.blend if blended else self.shade.opaque
-            shade([batch for batch, _ in pairs], band, self.views, self.placement)
+            shade(pairs, band, self.views, self.placement)
         return self._read(band)
 
     def _read(self, band: Band) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:

@@ -193,7 +193,7 @@ def test_what_suits_the_device_is_chosen(device: Device) -> None:
             other = SimpleNamespace(info=info, name="other")
             expected = "int64" if int64 else "owned" if software else "two-pass"
             assert choose_winners(other, "auto") == expected
-            assert choose_winners(other, "auto", general=True) == expected.replace(
+            assert choose_winners(other, "auto", ownable=False) == expected.replace(
                 "owned", "two-pass"
             )
             assert choose_winners(other, "two-pass") == "two-pass"

@@ -1,0 +1,31 @@
+// A triangle's row of points, found from the triangle and the window row.
+// Needs: the batch, RowOffsets.
+
+#include "common/triangles.glsl"
+#include "common/shear.glsl"
+#include "common/plane.glsl"
+#include "layout/PointRow"
+
+PointRow point_row(uint triangle, int row) {
+    uvec4 corners = triangles[triangle];
+    vec3 a = display_positions[corners.x].xyz;
+    vec3 b = display_positions[corners.y].xyz;
+    vec3 c = display_positions[corners.z].xyz;
+    Slice slice = slice_triangle(a, b, c, row, row_offsets[row]);
+    if (!slice.exists) slice.a = slice.b = SliceEnd(0.0, 1.0);  // covers nothing
+    uint facing = draws[corners.w].facing;
+    bool both = (facing & FACING_BOTH) != 0u;
+    // The eye that sees the triangle densest tells best which end is left where it is faced.
+    Plane plane = triangle_plane(a, b, c);
+    float eye = densest_eye_columns(plane);
+    bool rightward = column_from(slice.a, eye) <= column_from(slice.b, eye);
+    if (rightward != faces(facing, eye_side(plane, eye * frame.column_mm))) {
+        SliceEnd end = slice.a; slice.a = slice.b; slice.b = end;
+    }
+    float y_mm = row_centre_mm(row), offset = row_offsets[row];
+    float a_mm = (column_from(slice.a, eye) - offset) * frame.column_mm;
+    float b_mm = (column_from(slice.b, eye) - offset) * frame.column_mm;
+    return PointRow(slice.a.at_centre, slice.a.k, slice.b.at_centre, slice.b.k,
+                    plane_k(plane, eye * frame.column_mm, a_mm, y_mm), plane_k(plane, eye * frame.column_mm, b_mm, y_mm),
+                    triangle, uint(row) | (both ? DOUBLE_SIDED : 0u));
+}

@@ -1,0 +1,44 @@
+// Splat one point of the paper's lattice into a view: the pixels of the box about its cell that lie inside
+// the triangle (Gavane and Watson 2023, sections 3.3 and 3.5). Which pixels of a row do is told by
+// the triangle's slice, with the arithmetic of rows of points, so that both lattices cover the same.
+// In: Cells, CellWork, LatticeSteps, the batch, Eyes (columns), RowOffsets. Out: what visit() writes.
+
+#include "common/triangles.glsl"
+#include "cells/lattice.glsl"
+#include "common/alpha.glsl"
+#include "sample/point_row.glsl"
+#include "common/slices.glsl"
+#include "splat/interval.glsl"
+#include "layout/CellWork"
+
+layout(std430) readonly restrict buffer Cells { Cell cells[]; };
+layout(std430) readonly restrict buffer CellWorkBlock { CellWork cell_work; };
+layout(std430) readonly restrict buffer LatticeSteps { vec2 lattice_steps_mm[]; };
+layout(std430) readonly restrict buffer Eyes { float eyes[]; };
+
+uniform int first_row;  // the strip of the window to splat into, which bounds what is looped over
+uniform int end_row;
+
+void splat_cell(Cell point, int view, float eye) {
+    uvec4 corners = triangles[point.triangle];
+    vec3 a = display_positions[corners.x].xyz;
+    vec3 b = display_positions[corners.y].xyz;
+    vec3 c = display_positions[corners.z].xyz;
+    Plane plane = triangle_plane(a, b, c);
+    Aligned t = align(a, b, c, plane);
+    Box box = cell_box(t, lattice_steps_mm[point.triangle], uvec2(point.cell & 0xFFFFu, point.cell >> 16), eye);
+    ivec2 rows = clamp(rows_of_box(box), first_row, end_row);
+    int boxed = 0;
+    for (int row = rows.x; row < rows.y; row++) {
+        PointRow points = point_row(point.triangle, row);
+        Interval seen = interval_of(points, eye);
+        int left = max(column_cut(box.columns.x + row_offsets[row]), 0);
+        int right = min(column_cut(box.columns.y + row_offsets[row]), frame.columns);
+        boxed += max(right - left, 0);
+        seen.column = max(seen.column, left);
+        seen.end = min(seen.end, right);
+        splat_interval(points, seen, view, eye);
+    }
+    if (faces(draws[corners.w].facing, eye_side(plane, eye * frame.column_mm)))
+        tried(uint(first_row == frame.band_first ? max(boxed, 1) : boxed));
+}
