@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lfd_render.gpu.device import Device
-from lfd_render.gpu.layout import dtype
+from lfd_render.gpu.layout import CONSTANTS, dtype
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
@@ -19,7 +19,8 @@ from lfd_render.passes.sampling import Sampling
 from lfd_render.passes.splat import view_lanes
 from lfd_render.passes.view_target import Band, ViewTarget
 
-MOST_WINDOW_POINTS = 1 << 23  # points that one list holds: 64 MiB
+MOST_WINDOW_POINTS = 1 << 23  # that one list holds: 64 MiB, and above any one triangle's
+assert CONSTANTS["MOST_CELLS"] ** 2 < MOST_WINDOW_POINTS
 _SPAN_GROUP = 128  # local_size_x of cells/span.comp
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lfd_render.display import Camera, DisplayProfile, Rig, ViewGrid
 from lfd_render.reference.encode import encoded
+from lfd_render.reference.owners import Owner, owner_rays
 from lfd_render.reference.raster import Visibility, visible
 from lfd_render.reference.shade import Shading, opaque_at, points_at, seen_by_all
 from lfd_render.reference.transform import placed
@@ -58,11 +59,21 @@ def render_views(
 
 
 def shade_over(
-    linear: Float64, shading: Shading, shown: Visibility, rig: Rig, grid: ViewGrid
+    linear: Float64,
+    shading: Shading,
+    shown: Visibility,
+    rig: Rig,
+    grid: ViewGrid,
+    *,
+    owner: Owner | None = None,
 ) -> None:
-    """Lay what pixels show over view images [view, row, column, rgb], in place."""
+    """Lay what pixels show over view images [view, row, column, rgb], in place.
+
+    owner: which points are shaded, instead of where the pixels' rays hit.
+    """
     pixels, ids = shown.shown()
-    points = points_at(shading.triangles, rig, grid, ids, pixels)
+    through = owner and owner_rays(owner, shading.triangles, rig, grid, ids=ids, pixels=pixels)
+    points = points_at(shading.triangles, rig, grid, ids, pixels, through=through)
     if shading.lod == "multiview":
         points = seen_by_all(points, shading, rig, grid, pixels.view)
     colors = shading.colors(points, rig.eye_x_mm[pixels.view], rig.distance_mm)

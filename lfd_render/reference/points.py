@@ -175,6 +175,30 @@ def point_columns(
     return float(np.clip(np.sqrt(size_uv / size_xy), 1.0, MOST_COLUMNS))
 
 
+def row_point_mm(
+    scene: Scene,
+    triangles: Triangles,
+    index: int,
+    rig: Rig,
+    grid: ViewGrid,
+    *,
+    row: int,
+    p: Float64,
+) -> Float64:
+    """Where the point of a row that owns p [3], on the row's slice, is shaded: at its centre, kept
+    within the slice."""
+    corners = triangles.p_display[index]
+    ends_mm = slice_mm(corners, rig, grid, row)
+    assert ends_mm is not None
+    densest = densest_view(corners, rig)
+    cell = point_columns(scene, triangles, index, rig, grid)
+    seen = columns_of(np.vstack([ends_mm, p]), rig, grid, row, densest)
+    centre = (np.floor(seen[2] / cell) + 0.5) * cell
+    part = (np.clip(centre, *np.sort(seen[:2])) - seen[0]) / (seen[1] - seen[0])
+    over_depth = (np.array([1.0 - part, part]) / (rig.distance_mm - ends_mm[:, 2]))[:, None]
+    return np.asarray((over_depth * ends_mm).sum(axis=0) / over_depth.sum())
+
+
 def most_texels(scene: Scene, material: Material, texcoords: Float64) -> float:
     """Equation 1: n_tex, the most texels that any of a material's textures lays on a triangle.
 

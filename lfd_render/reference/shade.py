@@ -20,7 +20,7 @@ from lfd_render.reference import studio
 from lfd_render.reference.environment import Environment
 from lfd_render.reference.lights import Arrival, arriving
 from lfd_render.reference.points import densest_pixel_mm2, point_columns
-from lfd_render.reference.raster import Accepts, Pixels, faces, meet, rays
+from lfd_render.reference.raster import Accepts, Pixels, Rays, faces, meet, rays
 from lfd_render.reference.textures import Footprints, among_views, filtered, mip_chain
 from lfd_render.reference.transform import Triangles, points_by, unit
 from lfd_render.scene import Material, Scene
@@ -54,10 +54,21 @@ class Points:
         return blended
 
 
-def points_at(triangles: Triangles, rig: Rig, grid: ViewGrid, ids: Int, pixels: Pixels) -> Points:
-    """Points of pixels [pixel] on the triangles that ids [pixel] name."""
+def points_at(
+    triangles: Triangles,
+    rig: Rig,
+    grid: ViewGrid,
+    ids: Int,
+    pixels: Pixels,
+    *,
+    through: Rays | None = None,
+) -> Points:
+    """Points of pixels [pixel] on the triangles that ids [pixel] name.
+
+    through: other rays than those of the pixels' centres.
+    """
     corners = triangles.p_display[ids]
-    meeting = meet(corners, rays(rig, grid, pixels), rig.distance_mm)
+    meeting = meet(corners, through or rays(rig, grid, pixels), rig.distance_mm)
     whole = meeting.volumes.sum(axis=-1, keepdims=True)
     weights = meeting.weights
     # Volumes grow with the window point by their normals; a row leads downward.

@@ -16,19 +16,21 @@ from lfd_render.gpu.device import Device
 from lfd_render.gpu.layout import dtype
 from lfd_render.gpu.lighting import EnvironmentMap
 from lfd_render.gpu.memory import TextureArray
-from lfd_render.gpu.scene_buffers import SceneBuffers
+from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.owned import OwnedSplat
 from lfd_render.passes.placement import Placement
 from lfd_render.passes.prefilter import Prefilter
 from lfd_render.passes.sample import Sample
-from lfd_render.passes.sampling import Sampling
+from lfd_render.passes.sampling import DEFAULT_SAMPLING, Points, Sampling
 from lfd_render.passes.shade import Shade
 from lfd_render.passes.splat import Splat, view_lanes
+from lfd_render.passes.splat_cells import SplatCells
 from lfd_render.passes.transform import Transform
 from lfd_render.passes.view_buffers import choose_winners, make_view_buffers
 from lfd_render.passes.view_target import Band, ViewTarget
 from lfd_render.reference import Triangles, placed
 from lfd_render.scene import Environment, Image, Instance, Material, Mesh, Scene, TextureSlot
+from lfd_render.techniques.lfdpr import SOURCES
 
 FULL = os.environ.get("LFD_FULL") == "1"
 PAPER = "gavane-2024-tilted-4k"
@@ -246,7 +248,7 @@ class Passes:
         *,
         general: bool = False,
         winners: str = "auto",
-        stochastic_culling: bool = False,
+        sampling: Sampling = DEFAULT_SAMPLING,
         background: tuple[float, float, float] = (0.0, 0.0, 0.0),
         seed: int = 0,
         environment: str | Environment = "studio",
@@ -264,24 +266,31 @@ class Passes:
         self.buffers.lighting.use(self.map or environment, turn_rad=turn_rad, intensity=intensity)
         self.target = ViewTarget(device, rig, grid, self.buffers.batches, seed)
         self.transform = Transform(device)
-        self.sample = Sample(
-            device,
-            self.buffers,
-            view_lanes(rig.views),
-            sampling=Sampling(stochastic_culling=stochastic_culling),
-            whole_rows=general,
-        )
-        chosen = choose_winners(device, winners, ownable=not general)
-        self.int64 = chosen == "int64"
-        self.splat = (
-            OwnedSplat(device, self.buffers, self.target, lod=lod)
-            if chosen == "owned"
-            else Splat(
-                device, self.buffers, self.target, general=general, int64=self.int64, lod=lod
+        cells = sampling.lattice == "paper"
+        common = (device, self.buffers, self.target)
+        self.sample = (
+            SOURCES[sampling.source](*common, sampling)
+            if cells
+            else Sample(
+                device,
+                self.buffers,
+                view_lanes(rig.views),
+                sampling=sampling,
+                whole_rows=general,
             )
         )
+        chosen = choose_winners(device, winners, ownable=not (general or cells))
+        self.int64 = chosen == "int64"
+        if cells:
+            self.splat = SplatCells(*common, sampling, int64=self.int64, lod=lod)
+        elif chosen == "owned":
+            self.splat = OwnedSplat(*common, lod=lod, sampling=sampling)
+        else:
+            self.splat = Splat(
+                *common, general=general, int64=self.int64, lod=lod, sampling=sampling
+            )
         self.views = make_view_buffers(device, self.target, int64=self.int64)
-        self.shade = Shade(device, self.buffers, self.target, self.views.word_stride, lod=lod)
+        self.shade = Shade(*common, self.views.word_stride, lod=lod, sampling=sampling)
         self.points = [self.sample.allocate(batch) for batch in self.buffers.batches]
         self.buffers.place(self.display_from_world)
         for batch in self.buffers.batches:
@@ -293,6 +302,10 @@ class Passes:
             for band in self.target.bands:
                 self.sample(batch, points, band)
             self.sample.fit(points)
+            while isinstance(self.splat, SplatCells):
+                self._fill(batch, points)
+                if not self.sample.fit(points):
+                    break
         if isinstance(self.splat, OwnedSplat):
             for band in self.target.bands:
                 for batch, points in self.batches:
@@ -301,6 +314,12 @@ class Passes:
                         self.sample.fill(batch, points, band, window)
                         self.splat.bin(batch, points, window=window, band=band)
             self.splat.fit()
+
+    def _fill(self, batch: Batch, points: Points) -> None:
+        for band in self.target.bands:
+            self.sample(batch, points, band)
+            for window in range(points.windows):
+                self.sample.fill(batch, points, band, window)
 
     @property
     def batches(self) -> list[tuple]:

@@ -85,7 +85,7 @@ def test_winners_do_not_depend_on_the_order_of_points(device: Device, seed: int)
     profile = DisplayProfile.load(PAPER)
     rig, grid = profile.rig(7), ViewGrid.upright(profile, 40, 30)
     scene = random_scene(rng, profile, 30)
-    written = Sample.rows
+    written = Sample.fill
 
     def shuffled(self: Sample, batch, points, band, window) -> None:
         written(self, batch, points, band, window)
@@ -95,7 +95,7 @@ def test_winners_do_not_depend_on_the_order_of_points(device: Device, seed: int)
     for winners in ("owned", "two-pass"):
         straight = divided(device, scene, rig, grid, winners=winners)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(Sample, "rows", shuffled)
+            patch.setattr(Sample, "fill", shuffled)
             assert_same(straight, divided(device, scene, rig, grid, winners=winners))
 
 

@@ -12,6 +12,7 @@ from lfd_render.display import DisplayProfile, Rig, ViewGrid
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.layout import CONSTANTS
 from lfd_render.passes import sample, view_target
+from lfd_render.passes.sampling import Sampling
 from lfd_render.reference import Triangles, points
 from lfd_render.reference.culling import areas_px, kept
 from lfd_render.reference.points import PointRow, cells_of, columns_of, point_rows
@@ -269,7 +270,9 @@ def test_stochastic_culling_keeps_what_the_hash_says(
     shape = np.array([[-1.0, -1, 0], [1, -1, 0], [0, 1.5, 0]])
     corners = centre[:, None] + size[:, None, None] * shape
     scene = scene_of(mesh_of(corners))
-    with passes(device, scene, rig, grid, stochastic_culling=True, seed=seed) as opened:
+    with passes(
+        device, scene, rig, grid, sampling=Sampling(stochastic_culling=True), seed=seed
+    ) as opened:
         rows, _ = opened.rows()
         triangles = opened.triangles()
     area = areas_px(triangles, rig, grid)
