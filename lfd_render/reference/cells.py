@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.display import Rig, ViewGrid
-from lfd_render.reference.points import eye_sides, most_texels
+from lfd_render.reference.points import eye_sides, most_texels, pixel_sides_mm
 from lfd_render.reference.transform import Triangles
 from lfd_render.scene import Scene
 
@@ -96,18 +96,13 @@ def lattice_of(
 def shortest_sides_mm(corners: Float64, rig: Rig, grid: ViewGrid) -> Float64:
     """S_ortho's inverse: the shortest column and row, [2] mm, that any eye projects back to the
     triangle where that is closest to it."""
-    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-    steps = np.array([[grid.column_mm, 0.0, 0.0], [0.0, grid.panel_mm[1] / grid.rows, 0.0]])
     shortest = np.full(2, np.inf)
-    for eye_mm, side in zip(rig.eye_x_mm, eye_sides(corners, rig), strict=True):
+    for view, side in enumerate(eye_sides(corners, rig)):
         if side == 0.0:
             continue
-        eye = np.array([eye_mm, 0.0, rig.distance_mm])
+        eye = np.array([rig.eye_x_mm[view], 0.0, rig.distance_mm])
         closest = closest_on_triangle(eye, corners)
-        depth = max(rig.distance_mm - closest[2], rig.near_mm)
-        # The ray moves on by a step, and along itself as far as keeps it on the plane.
-        moved = steps + np.outer(steps @ normal / side, closest - eye)
-        shortest = np.minimum(shortest, depth / rig.distance_mm * np.linalg.norm(moved, axis=1))
+        shortest = np.minimum(shortest, pixel_sides_mm(corners, closest, rig, grid, view))
     return shortest
 
 

@@ -72,10 +72,13 @@ def shade_over(
     owner: which points are shaded, instead of where the pixels' rays hit.
     """
     pixels, ids = shown.shown()
-    through = owner and owner_rays(owner, shading.triangles, rig, grid, ids=ids, pixels=pixels)
+    through = (
+        owner_rays(owner, shading.triangles, rig, grid, ids=ids, pixels=pixels) if owner else None
+    )
     points = points_at(shading.triangles, rig, grid, ids, pixels, through=through)
     if shading.lod == "multiview":
-        points = seen_by_all(points, shading, rig, grid, pixels.view)
+        cell_mm2 = owner.cell_mm2 if owner else None
+        points = seen_by_all(points, shading, rig, grid, pixels.view, cell_mm2=cell_mm2)
     colors = shading.colors(points, rig.eye_x_mm[pixels.view], rig.distance_mm)
     opacity = np.where(shading.triangles.blended[ids], shading.alpha(points), 1.0)[:, None]
     at = (pixels.view, pixels.row, pixels.column)

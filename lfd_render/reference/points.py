@@ -161,18 +161,48 @@ def densest_pixel_mm2(corners: Float64, rig: Rig, grid: ViewGrid) -> float:
 
 
 def point_columns(
-    scene: Scene, triangles: Triangles, index: int, rig: Rig, grid: ViewGrid
+    scene: Scene,
+    triangles: Triangles,
+    index: int,
+    rig: Rig,
+    grid: ViewGrid,
+    *,
+    isotropic: bool = False,
+    texture_limit: bool = True,
 ) -> float:
-    """Length of a triangle's points in columns: 1 to MOST_COLUMNS."""
+    """Length of a triangle's points in columns: 1 to MOST_COLUMNS; isotropic: where a row is
+    shorter than a column on the triangle, from as little as 1/MOST_COLUMNS on."""
     corners = triangles.p_display[index]
+    columns = _square_columns(corners, rig, grid) if isotropic else 1.0
+    if not texture_limit:
+        return columns
     material = scene.materials[int(triangles.material[index])]
     texels = most_texels(scene, material, triangles.texcoords[index])
     if texels == 0.0:
         return MOST_COLUMNS
     area_mm2 = 0.5 * np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0]))
     size_uv = area_mm2 / texels  # equation 2
-    size_xy = densest_pixel_mm2(corners, rig, grid)
-    return float(np.clip(np.sqrt(size_uv / size_xy), 1.0, MOST_COLUMNS))
+    size_xy = densest_pixel_mm2(corners, rig, grid) * columns
+    return float(columns * np.clip(np.sqrt(size_uv / size_xy), 1.0, MOST_COLUMNS / columns))
+
+
+def _square_columns(corners: Float64, rig: Rig, grid: ViewGrid) -> float:
+    """How many columns are as long as a row, both projected back to the triangle's middle from the
+    densest eye; at most 1."""
+    view = densest_view(corners, rig)
+    sides = pixel_sides_mm(corners, corners.mean(axis=0), rig, grid, view)
+    return float(np.clip(sides[1] / sides[0], 1.0 / MOST_COLUMNS, 1.0))
+
+
+def pixel_sides_mm(corners: Float64, p: Float64, rig: Rig, grid: ViewGrid, view: int) -> Float64:
+    """A view's column and row, [2] mm, projected back to a point p [3] of a triangle's plane: the
+    ray moves on by a step, and along itself as far as keeps it on the plane."""
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    ray = p - (rig.eye_x_mm[view], 0.0, rig.distance_mm)
+    steps = np.array([[grid.column_mm, 0.0, 0.0], [0.0, grid.panel_mm[1] / grid.rows, 0.0]])
+    depth = max(rig.distance_mm - p[2], rig.near_mm)
+    moved = steps - np.outer(steps @ normal / (ray @ normal), ray)
+    return np.asarray(depth / rig.distance_mm * np.linalg.norm(moved, axis=1))
 
 
 def row_point_mm(
@@ -184,6 +214,7 @@ def row_point_mm(
     *,
     row: int,
     p: Float64,
+    isotropic: bool = False,
 ) -> Float64:
     """Where the point of a row that owns p [3], on the row's slice, is shaded: at its centre, kept
     within the slice."""
@@ -191,7 +222,7 @@ def row_point_mm(
     ends_mm = slice_mm(corners, rig, grid, row)
     assert ends_mm is not None
     densest = densest_view(corners, rig)
-    cell = point_columns(scene, triangles, index, rig, grid)
+    cell = point_columns(scene, triangles, index, rig, grid, isotropic=isotropic)
     seen = columns_of(np.vstack([ends_mm, p]), rig, grid, row, densest)
     centre = (np.floor(seen[2] / cell) + 0.5) * cell
     part = (np.clip(centre, *np.sort(seen[:2])) - seen[0]) / (seen[1] - seen[0])

@@ -8,7 +8,7 @@ of a corner is α/(α + β + γ), and its derivative follows by the quotient rul
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -84,8 +84,19 @@ def points_at(
     return Points(ids, weights, weights_dx, weights_dy, p_display, p_dx, p_dy, back, alone)
 
 
-def seen_by_all(points: Points, shading: Shading, rig: Rig, grid: ViewGrid, view: Int) -> Points:
-    """Points [pixel] with what their footprints are in all views; view: each pixel's own."""
+def seen_by_all(
+    points: Points,
+    shading: Shading,
+    rig: Rig,
+    grid: ViewGrid,
+    view: Int,
+    *,
+    cell_mm2: Callable[[int], float] | None = None,
+) -> Points:
+    """Points [pixel] with what their footprints are in all views; view: each pixel's own.
+
+    cell_mm2: area of a triangle's points, where they are not those of rows.
+    """
     triangles, scene = shading.triangles, shading.scene
     areas = np.stack(
         [pixel_areas_mm2(points, triangles, rig, grid, eye) for eye in rig.eye_x_mm], axis=1
@@ -95,6 +106,9 @@ def seen_by_all(points: Points, shading: Shading, rig: Rig, grid: ViewGrid, view
     for index in np.unique(points.ids).tolist():
         corners = triangles.p_display[index]
         at = points.ids == index
+        if cell_mm2 is not None:
+            splat[at] = cell_mm2(index)
+            continue
         # One point's cell: so many pixels of the eye that sees the plane densest.
         depth = rig.distance_mm - points.p_display[at, 2]
         nearest = max(rig.near_mm, rig.distance_mm - corners[:, 2].max())

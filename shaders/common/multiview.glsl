@@ -31,7 +31,7 @@ float least_side(Plane plane, float sign) {
 }
 
 // As Footprint.views.
-vec3 footprint_views(uint triangle, Plane plane, float eye_mm, uint facing) {
+vec3 footprint_views(uint triangle, Plane plane, float eye_mm, uint facing, float depth) {
     float first = eye_side(plane, frame.eye_first * frame.column_mm);
     float last = eye_side(plane, frame.eye_last * frame.column_mm);
     float side = eye_side(plane, eye_mm), sign = side < 0.0 ? -1.0 : 1.0;
@@ -47,7 +47,7 @@ vec3 footprint_views(uint triangle, Plane plane, float eye_mm, uint facing) {
 
     // Equation 8: a splat no smaller than this view's pixel, of so many densest pixels.
     float densest = max(abs(first), abs(last));
-    float splat = own / max(densest, 1e-30) * densest_pixels_of(triangle, plane);
+    float splat = own / max(densest, 1e-30) * densest_pixels_of(triangle, plane, depth);
     float used = clamp(max(1.0, splat), smallest, largest);
     return vec3(smallest, largest, largest > smallest ? (used - smallest) / (largest - smallest) : 0.0);
 }

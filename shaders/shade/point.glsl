@@ -11,10 +11,12 @@
 // of a row in columns.
 layout(std430) readonly restrict buffer PointSizes { vec2 point_sizes[]; };
 
-// Area of a point in pixels of the view that sees its triangle densest.
-float densest_pixels_of(uint triangle, Plane plane) {
+// Area of a point at some depth in pixels of the view that sees its triangle densest, which grow with the
+// depth's cube, as points of rows do.
+float densest_pixels_of(uint triangle, Plane plane, float depth) {
     vec2 size = point_sizes[triangle];
-    return PAPER_LATTICE == 0 ? size.y : size.x * size.y / densest_pixel_mm2(plane);
+    float farther = depth / plane.depths.x;
+    return PAPER_LATTICE == 0 ? size.y : size.x * size.y / (densest_pixel_mm2(plane) * farther * farther * farther);
 }
 
 // Centre of the cell of the paper's lattice that p lies in, or what of the triangle is closest to it.

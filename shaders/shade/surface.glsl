@@ -51,7 +51,7 @@ Surface surface_at(uint triangle, int view, int row, int column) {
     mat3x2 uv0 = mat3x2(tex_coords[corners.x], tex_coords[corners.y], tex_coords[corners.z]);
     mat3x2 uv1 = mat3x2(vertex_uv1(corners.x), vertex_uv1(corners.y), vertex_uv1(corners.z));
     uint facing = draws[corners.w].facing;
-    vec3 views = LOD_RULE == LOD_MULTIVIEW ? footprint_views(triangle, plane, eye_mm, facing) : ONE_VIEW;
+    vec3 views = LOD_RULE == LOD_MULTIVIEW ? footprint_views(triangle, plane, eye_mm, facing, depth_of(hit.p_display)) : ONE_VIEW;
 
     Surface surface;
     surface.to_eye = mat3(turn_from_display) * (vec3(eye_mm, 0.0, frame.distance_mm) - hit.p_display);

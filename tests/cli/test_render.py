@@ -47,6 +47,14 @@ def test_options_reach_the_renderer(
         "splat": "auto",
         "spacing": "angle",
         "lod": "long-axis",
+        "lattice": None,
+        "point_source": None,
+        "density": None,
+        "texture_limit": None,
+        "culling": None,
+        "stochastic_culling": None,
+        "shade": None,
+        "effort": False,
         "seed": 9,
         "repeat": 3,
         "environment": "studio",
@@ -54,6 +62,28 @@ def test_options_reach_the_renderer(
         "environment_intensity": 1.0,
         "exposure": 1.0,
     }
+
+
+def test_the_ideas_of_lfdpr_reach_the_renderer(
+    command: Command, renderer: FakeRenderer, scene: Path, display: Path, tmp_path: Path
+) -> None:
+    result = command(
+        "render", scene, "-o", tmp_path / "a.png", "-d", display, "--json", "--lattice", "paper",
+        "--point-source", "raster", "--density", "isotropic", "--no-texture-limit",
+        "--culling", "vertices", "--stochastic-culling", "--shade", "point",
+    )  # fmt: skip
+    assert result.code == 0
+    given = {
+        "lattice": "paper",
+        "point_source": "raster",
+        "density": "isotropic",
+        "texture_limit": False,
+        "culling": "vertices",
+        "stochastic_culling": True,
+        "shade": "point",
+        "effort": True,  # counted for --json
+    }
+    assert given.items() <= renderer.calls[0].items()
 
 
 def test_light_reaches_the_renderer(

@@ -1,0 +1,55 @@
+"""What a caller may choose about rendering, and what presets choose for them."""
+
+import dataclasses
+
+import pytest
+
+from lfd_render.errors import UsageError
+from lfd_render.passes.sampling import DEFAULT_SAMPLING, PAPER_SAMPLING
+from lfd_render.renderer import RenderOptions
+
+
+def test_presets_choose_the_sampling() -> None:
+    assert RenderOptions().sampling == DEFAULT_SAMPLING
+    assert RenderOptions(preset="paper").sampling == PAPER_SAMPLING
+
+
+def test_the_papers_preset_differs_from_ours_in_all_but_what_both_have() -> None:
+    ours, paper = dataclasses.asdict(DEFAULT_SAMPLING), dataclasses.asdict(PAPER_SAMPLING)
+    assert {name for name in ours if ours[name] == paper[name]} == {"density", "texture_limit"}
+
+
+@pytest.mark.parametrize(
+    ("options", "lattice", "source"),
+    [
+        ({"lattice": "paper"}, "paper", "compute"),
+        ({"point_source": "raster"}, "paper", "raster"),
+        ({"preset": "paper", "lattice": "rows"}, "rows", "compute"),
+        ({"preset": "paper", "point_source": "compute"}, "paper", "compute"),
+    ],
+)
+def test_what_is_not_chosen_follows_from_what_is(
+    options: dict[str, str], lattice: str, source: str
+) -> None:
+    sampling = RenderOptions(**options).sampling
+    assert (sampling.lattice, sampling.source) == (lattice, source)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"lattice": "hexagons"}, "lattice 'hexagons': unknown; use rows or paper"),
+        ({"point_source": "rays"}, "point source 'rays': unknown; use compute or raster"),
+        ({"density": "high"}, "density 'high': unknown; use lfd or isotropic"),
+        ({"culling": "all"}, "culling 'all': unknown; use exact or vertices"),
+        ({"shade": "pixel"}, "shade 'pixel': unknown; use ray or point"),
+        ({"lattice": "rows", "point_source": "raster"}, "rows are cut in compute"),
+        ({"lattice": "paper", "projection": "general"}, "use it with lattice 'rows'"),
+        ({"lattice": "paper", "splat": "owned"}, "use auto, two-pass or int64"),
+        ({"lattice": "paper", "technique": "mvr"}, "lattice 'paper': technique 'mvr'"),
+        ({"texture_limit": False, "technique": "mvr"}, "texture limit False: technique 'mvr'"),
+    ],
+)
+def test_what_cannot_be_says_so(options: dict[str, object], message: str) -> None:
+    with pytest.raises(UsageError, match=message.replace("?", r"\?")):
+        RenderOptions(**options)
