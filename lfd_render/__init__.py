@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from lfd_render.panel.eia import Eia
     from lfd_render.panel.look import look
     from lfd_render.renderer import Renderer
-    from lfd_render.scene import Environment, Scene
+    from lfd_render.scene import Environment, Pose, Scene, node_transform
 
 __version__ = "0.1.0"
 
@@ -17,10 +17,12 @@ __all__ = [
     "DisplayProfile",
     "Eia",
     "Environment",
+    "Pose",
     "Renderer",
     "Scene",
     "__version__",
     "look",
+    "node_transform",
 ]
 
 # Loaded when first used, so that the command line answers --help without numpy or OpenGL.
@@ -29,9 +31,11 @@ _HOMES = {
     "DisplayProfile": "lfd_render.display",
     "Eia": "lfd_render.panel.eia",
     "Environment": "lfd_render.scene",
+    "Pose": "lfd_render.scene",
     "Renderer": "lfd_render.renderer",
     "Scene": "lfd_render.scene",
     "look": "lfd_render.panel.look",
+    "node_transform": "lfd_render.scene",
 }
 
 

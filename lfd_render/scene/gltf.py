@@ -1,7 +1,7 @@
 """glTF 2.0 files, `.gltf` and `.glb`, as scenes.
 
-Animations, skins and morph targets stand in their rest pose; points, lines and orthographic
-cameras are left out; each of these gives a warning.
+Nodes, skins and morph targets are kept, so that poses move them. Animations are not played; points,
+lines and orthographic cameras are left out; each of these gives a warning.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from lfd_render.scene.gltf_lights import read_lights
 from lfd_render.scene.gltf_materials import Materials
 from lfd_render.scene.gltf_meshes import Meshes
 from lfd_render.scene.gltf_nodes import NodeTree
+from lfd_render.scene.gltf_skins import read_skins
 from lfd_render.scene.limits import Budget, LoadLimits
 from lfd_render.scene.model import Instance, Scene
 
@@ -31,7 +32,8 @@ def load_gltf(path: Path, limits: LoadLimits) -> Scene:
     accessors = Accessors(document)
     tree = NodeTree(document)
     materials = Materials(document, accessors)
-    meshes = Meshes(document, accessors, materials, tree)
+    skins = read_skins(document, accessors)
+    meshes = Meshes(document, accessors, materials, skins)
     instances = _instances(document, tree, meshes)
     if document.root.children("animations"):
         document.warn("animations: not played; the scene stands in its rest pose")
@@ -44,27 +46,33 @@ def load_gltf(path: Path, limits: LoadLimits) -> Scene:
         cameras=tree.cameras(),
         lights=read_lights(document, tree),
         warnings=document.warnings,
+        nodes=tree.nodes,
+        skins=skins,
     )
 
 
 def _instances(document: Document, tree: NodeTree, meshes: Meshes) -> list[Instance]:
     instances: list[Instance] = []
     limit = document.budget.limits.nodes
+    moving = bool(document.root.children("animations"))
     for node in tree.drawn():
         fields = document.nodes[node]
         mesh_index = fields.index("mesh", len(document.meshes))
         if mesh_index is None:
             continue
-        # A skinned mesh comes from its joints into the world; its node's transform is ignored.
-        skinned = "skin" in fields
-        world_from_local = np.eye(4) if skinned else tree.world_from_node[node]
-        if not skinned and np.linalg.matrix_rank(world_from_local[:3, :3]) < 2:
+        world_from_local = tree.world_from_node[node]
+        # What is flat at rest may grow where nodes move.
+        flat = not moving and np.linalg.matrix_rank(world_from_local[:3, :3]) < 2
+        if flat and "skin" not in fields:
             document.warn(f"{fields.path}: scaled to a line or a point and left out")
             continue
-        name = fields.text("name", f"node {node}")
-        instances.extend(
-            Instance(name, place, world_from_local) for place in meshes.place(mesh_index, fields)
-        )
+        for mesh, weights in meshes.place(mesh_index, fields):
+            skin = fields.index("skin", len(document.skins))
+            skin = None if meshes.meshes[mesh].influences is None else skin
+            # A skinned mesh comes from its joints into the world; its node's transform is ignored.
+            matrix = world_from_local if skin is None else np.eye(4)
+            name = tree.nodes.names[node]
+            instances.append(Instance(name, mesh, matrix, node, skin, weights))
         if len(instances) > limit:
             raise ResourceError(f"nodes: more than {limit} instances; give a smaller scene")
     return instances

@@ -36,13 +36,13 @@ def read_lights(document: Document, tree: NodeTree) -> tuple[Light, ...]:
         if not np.any(world_from_node[:3, 2]):
             document.warn(f"{use.path}: scaled to nothing along its −z and left out")
             continue
-        lights.append(_light(kinds[index], f"light {index}", world_from_node))
+        lights.append(_light(kinds[index], f"light {index}", world_from_node, node))
         if len(lights) > limit:
             raise ResourceError(f"{_EXTENSION}: more than {limit} lights; give a scene of fewer")
     return tuple(lights)
 
 
-def _light(fields: Fields, name: str, world_from_light: np.ndarray) -> Light:
+def _light(fields: Fields, name: str, world_from_light: np.ndarray, node: int) -> Light:
     kind = fields.choice("type", LIGHT_KINDS)
     red, green, blue = fields.numbers("color", (1.0, 1.0, 1.0), low=0.0)
     reach = fields.number("range", low=0.0) if "range" in fields else None
@@ -58,6 +58,7 @@ def _light(fields: Fields, name: str, world_from_light: np.ndarray) -> Light:
         range=reach,
         inner_cone_rad=inner,
         outer_cone_rad=outer,
+        node=node,
     )
 
 

@@ -11,6 +11,7 @@ from lfd_render.errors import ResourceError, SceneError
 from lfd_render.scene.fields import Fields
 from lfd_render.scene.gltf_document import Document
 from lfd_render.scene.model import SceneCamera
+from lfd_render.scene.nodes import NO_PARENT, Nodes, node_transform
 
 Matrix = NDArray[np.float64]
 
@@ -26,7 +27,16 @@ class NodeTree:
         count = len(document.nodes)
         self._children = [n.indices("children", count) for n in document.nodes]
         self._parents = self._find_parents()
-        self.world_from_node = self._transforms()
+        self._refuse_cycles()
+        self.nodes = Nodes(
+            tuple(n.text("name", f"node {i}") for i, n in enumerate(document.nodes)),
+            np.array([NO_PARENT if p is None else p for p in self._parents], np.int64),
+            np.array([local_transform(n) for n in document.nodes]).reshape(-1, 4, 4),
+        )
+        self.world_from_node = self.nodes.world()
+        bad = np.flatnonzero(~np.isfinite(self.world_from_node).all(axis=(1, 2)))
+        if len(bad):
+            raise SceneError(f"nodes[{bad[0]}]: its world transform overflows; scale it down")
 
     def drawn(self) -> list[int]:
         """Nodes of the default scene, parents before children, in the file's order."""
@@ -50,28 +60,20 @@ class NodeTree:
                 parents[child] = node
         return parents
 
-    def _transforms(self) -> list[Matrix]:
-        """World transform of each node; a node that no root leads to is part of a cycle."""
-        world: list[Matrix | None] = [None] * len(self._children)
+    def _refuse_cycles(self) -> None:
+        """A node that no root leads to is part of a cycle."""
+        reached = np.zeros(len(self._children), bool)
         stack = [i for i, parent in enumerate(self._parents) if parent is None]
         while stack:
             node = stack.pop()
-            matrix = local_transform(self._document.nodes[node])
-            parent = self._parents[node]
-            above = None if parent is None else world[parent]
-            matrix = matrix if above is None else above @ matrix
-            if not np.isfinite(matrix).all():
-                raise SceneError(f"nodes[{node}]: its world transform overflows; scale it down")
-            world[node] = matrix
+            reached[node] = True
             stack.extend(self._children[node])
-        done = [w for w in world if w is not None]
-        if len(done) < len(world):
-            bad = next(i for i, w in enumerate(world) if w is None)
+        if not reached.all():
+            bad = int(np.argmin(reached))
             raise SceneError(
                 f"nodes[{bad}].children: node {bad} is its own ancestor or descends from such a "
                 "cycle; give the nodes as a tree"
             )
-        return done
 
     def _roots(self) -> list[int]:
         """Roots of the file's default scene; of all nodes where it has no scenes."""
@@ -105,7 +107,7 @@ class NodeTree:
                 continue
             name = camera.text("name", fields.text("name", f"camera {index}"))
             yfov_rad = camera.child("perspective").number("yfov", low=1e-6, high=math.pi - 1e-6)
-            cameras.append(SceneCamera(name, self.world_from_node[node], yfov_rad))
+            cameras.append(SceneCamera(name, self.world_from_node[node], yfov_rad, node))
         return tuple(cameras)
 
 
@@ -116,23 +118,11 @@ def local_transform(fields: Fields) -> Matrix:
         if not np.array_equal(matrix[3], (0.0, 0.0, 0.0, 1.0)):
             fields.fail("matrix", "give an affine matrix: entries 4, 8, 12 are 0 and 16 is 1")
         return matrix
-    matrix = np.eye(4)
-    matrix[:3, :3] = _rotation(fields) * fields.numbers("scale", (1.0, 1.0, 1.0))
-    matrix[:3, 3] = fields.numbers("translation", (0.0, 0.0, 0.0))
-    return matrix
-
-
-def _rotation(fields: Fields) -> Matrix:
-    """Rotation matrix [3, 3] of the unit quaternion (x, y, z, w); any length but 0 is accepted."""
-    quaternion = np.array(fields.numbers("rotation", (0.0, 0.0, 0.0, 1.0)))
-    length = float(np.linalg.norm(quaternion))
-    if not 0.0 < length < math.inf:
+    rotation = fields.numbers("rotation", (0.0, 0.0, 0.0, 1.0))
+    if not 0.0 < float(np.linalg.norm(rotation)) < math.inf:
         fields.fail("rotation", "give a unit quaternion x y z w")
-    x, y, z, w = quaternion / length
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
+    return node_transform(
+        fields.numbers("translation", (0.0, 0.0, 0.0)),
+        rotation,
+        fields.numbers("scale", (1.0, 1.0, 1.0)),
     )

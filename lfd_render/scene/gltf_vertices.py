@@ -7,26 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lfd_render.errors import SceneError
+from lfd_render.scene.deform import MOST_TARGETS, Influences, Morph
 from lfd_render.scene.fields import Fields
 from lfd_render.scene.gltf_accessors import Accessors
 from lfd_render.scene.gltf_document import Document
-from lfd_render.scene.gltf_skins import Skinning, morph
 
 
 class Vertices:
     """The attributes of one primitive, each with as many elements as POSITION."""
 
-    def __init__(
-        self,
-        primitive: Fields,
-        weights: Sequence[float],
-        accessors: Accessors,
-        document: Document,
-    ) -> None:
-        """`weights` are those of the morph targets; none at all stands for zeros."""
+    def __init__(self, primitive: Fields, accessors: Accessors, document: Document) -> None:
         self._primitive = primitive
-        self._weights = weights
         self._attributes = primitive.child("attributes")
         self._targets = primitive.children("targets")
         self._accessors = accessors
@@ -65,19 +56,31 @@ class Vertices:
         renumbered = np.cumsum(touched, dtype=np.uint32) - np.uint32(1)
         return renumbered[triangles]
 
-    def morphed(self, name: str) -> NDArray[np.float32]:
-        """POSITION or NORMAL, [n, 3], with the morph targets at their default weights."""
-        base = self._floats(self._attributes, name, ("VEC3",))
-        if not self._targets or not any(self._weights):
-            return base
-        if len(self._weights) != len(self._targets):
-            raise SceneError(
-                f"{self._primitive.path}.targets: {len(self._targets)} targets and "
-                f"{len(self._weights)} weights; give as many weights as targets"
-            )
-        pairs = [(t, w) for t, w in zip(self._targets, self._weights, strict=True) if name in t]
-        deltas = [self._floats(t, name, ("VEC3",)) for t, _ in pairs]
-        return morph(base, deltas, [w for _, w in pairs])
+    def vectors(self, name: str) -> NDArray[np.float32]:
+        """POSITION or NORMAL, [n, 3]."""
+        return self._floats(self._attributes, name, ("VEC3",))
+
+    @property
+    def target_count(self) -> int:
+        """Morph targets of the primitive."""
+        return len(self._targets)
+
+    def morph(self) -> Morph | None:
+        """The displacements of the morph targets, zero where a target has none; None without."""
+        if not self._targets:
+            return None
+        if len(self._targets) > MOST_TARGETS:
+            self._primitive.fail("targets", f"give at most {MOST_TARGETS} targets")
+        shape = (len(self._targets), self.count, 3)
+        displacements = {}
+        for name in ("POSITION", "NORMAL"):
+            has = any(name in target for target in self._targets)
+            values = np.zeros(shape, np.float32) if has else np.broadcast_to(np.float32(0), shape)
+            for row, target in zip(values, self._targets, strict=True):
+                if name in target:
+                    row[:] = self._floats(target, name, ("VEC3",))
+            displacements[name] = values
+        return Morph(displacements["POSITION"], displacements["NORMAL"])
 
     def texcoords(self) -> NDArray[np.float32]:
         """Both coordinate sets, [n, 2, 2] as [vertex, set, uv], zero where absent."""
@@ -95,8 +98,9 @@ class Vertices:
             out[:, : values.shape[1]] = values
         return out
 
-    def skinning(self, matrices: NDArray[np.float64]) -> Skinning | None:
-        """The joints and weights of all sets; None, with a warning, where there are none."""
+    def influences(self, joint_count: int) -> Influences | None:
+        """The joints and weights of all sets, of a skin of so many joints; None, with a warning,
+        where there are none."""
         joints: list[NDArray[np.int64]] = []
         weights: list[NDArray[np.float32]] = []
         while self.has(f"JOINTS_{len(joints)}") and self.has(f"WEIGHTS_{len(joints)}"):
@@ -104,9 +108,9 @@ class Vertices:
             values = self._accessors.integers(self._index(self._attributes, key), ("VEC4",))
             self._check_count(self._attributes, key, len(values))
             values = values if self._used is None else values[self._used]
-            if int(values.max()) >= len(matrices):
+            if int(values.max()) >= joint_count:
                 self._attributes.fail(
-                    key, f"joint {int(values.max())} is named, the skin has {len(matrices)}"
+                    key, f"joint {int(values.max())} is named, the skin has {joint_count}"
                 )
             key = f"WEIGHTS_{len(joints)}"
             weights.append(self._floats(self._attributes, key, ("VEC4",), normalized=True))
@@ -114,7 +118,7 @@ class Vertices:
         if not joints:
             self._document.warn(f"{self._primitive.path}: skinned without JOINTS_0 and WEIGHTS_0")
             return None
-        return Skinning(matrices, np.concatenate(joints, axis=1), np.concatenate(weights, axis=1))
+        return Influences.scaled(np.concatenate(joints, axis=1), np.concatenate(weights, axis=1))
 
     def _floats(
         self, owner: Fields, name: str, types: Sequence[str], normalized: bool = False

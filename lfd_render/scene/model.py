@@ -1,21 +1,29 @@
-"""What a scene is: frozen numpy data in world space, no GPU, no file format.
+"""What a scene is: frozen numpy data, no GPU, no file format.
 
-Meshes are shared by instances; nothing is duplicated per instance. Every constructor checks
-shapes, dtypes, finite values and index bounds, and raises SceneError naming mesh and field.
+Meshes are shared by instances; nothing is duplicated per instance. What moves hangs on nodes; a
+`Pose` says where they stand, by default at rest. Every constructor checks shapes, dtypes, finite
+values and index bounds, and raises SceneError naming mesh and field.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, NotRequired, TypedDict
+from typing import TYPE_CHECKING, Literal, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.errors import SceneError
+from lfd_render.scene.checks import check_affine, freeze
+from lfd_render.scene.deform import Influences, Morph, Skin
 from lfd_render.scene.limits import MOST_LIGHTS, LoadLimits
+from lfd_render.scene.nodes import Nodes
+
+if TYPE_CHECKING:
+    from lfd_render.scene.pose import Pose
 
 Wrap = Literal["repeat", "clamp", "mirror"]
 AlphaMode = Literal["opaque", "mask", "blend"]
@@ -46,7 +54,7 @@ class Image:
 
     def __post_init__(self) -> None:
         """Check the array and make it read-only."""
-        _freeze(self, f"image '{self.name}'", "pixels", np.uint8, (None, None, 4))
+        freeze(self, f"image '{self.name}'", "pixels", np.uint8, (None, None, 4))
         if self.pixels.size == 0:
             raise SceneError(f"image '{self.name}': pixels: no texels; give at least 1 × 1")
 
@@ -77,7 +85,7 @@ class TextureSlot:
         if not np.isfinite(self.scale):
             raise SceneError(f"texture: scale: {self.scale}; give a finite number")
         if self.uv_transform is not None:
-            _freeze(self, "texture", "uv_transform", np.float64, (3, 3))
+            freeze(self, "texture", "uv_transform", np.float64, (3, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +138,9 @@ class Mesh:
     """Indexed triangles of one material, counter-clockwise seen from the front.
 
     positions f32[n,3], normals f32[n,3] of unit length, texcoords f32[n,2,2] as
-    [vertex, set, uv], colors f32[n,4] linear, triangles u32[m,3].
+    [vertex, set, uv], colors f32[n,4] linear, triangles u32[m,3]. With morph targets or joint
+    influences these positions and normals are those before either. flat: normals are the
+    triangles' own, and triangle t has vertices 3t, 3t + 1, 3t + 2.
     """
 
     name: str
@@ -140,16 +150,19 @@ class Mesh:
     colors: NDArray[np.float32]
     triangles: NDArray[np.uint32]
     material: int
+    morph: Morph | None = None
+    influences: Influences | None = None
+    flat: bool = False
 
     def __post_init__(self) -> None:
         """Check arrays against each other and make them read-only."""
         label = f"mesh '{self.name}'"
         count = len(self.positions)
-        _freeze(self, label, "positions", np.float32, (None, 3))
-        _freeze(self, label, "normals", np.float32, (count, 3))
-        _freeze(self, label, "texcoords", np.float32, (count, 2, 2))
-        _freeze(self, label, "colors", np.float32, (count, 4))
-        _freeze(self, label, "triangles", np.uint32, (None, 3))
+        freeze(self, label, "positions", np.float32, (None, 3))
+        freeze(self, label, "normals", np.float32, (count, 3))
+        freeze(self, label, "texcoords", np.float32, (count, 2, 2))
+        freeze(self, label, "colors", np.float32, (count, 4))
+        freeze(self, label, "triangles", np.uint32, (None, 3))
         if self.material < 0:
             raise SceneError(f"{label}: material: {self.material}; give an index from 0")
         if self.triangles.size and int(self.triangles.max()) >= count:
@@ -157,33 +170,64 @@ class Mesh:
                 f"{label}: triangles: index {int(self.triangles.max())} out of range; "
                 f"the mesh has {count} vertices"
             )
+        if self.morph is not None and self.morph.positions.shape[1] != count:
+            raise SceneError(
+                f"{label}: morph: {self.morph.positions.shape[1]} displacements a target; "
+                f"the mesh has {count} vertices"
+            )
+        if self.influences is not None and len(self.influences.joints) != count:
+            raise SceneError(
+                f"{label}: influences: of {len(self.influences.joints)} vertices; "
+                f"the mesh has {count}"
+            )
+        in_order = np.arange(count, dtype=np.uint32)
+        if self.flat and not np.array_equal(self.triangles.ravel(), in_order):
+            raise SceneError(f"{label}: flat: triangles share vertices; give each its own")
+
+    @property
+    def target_count(self) -> int:
+        """Morph targets of the mesh."""
+        return 0 if self.morph is None else len(self.morph.positions)
 
 
 @dataclass(frozen=True, eq=False)
 class Instance:
-    """A mesh placed in the world; a negative determinant mirrors it and turns its winding."""
+    """A mesh placed in the world; a negative determinant mirrors it and turns its winding.
+
+    node: the node that places it, at rest by this very matrix; None: it stands still. skin: one of
+    the scene's, whose joints take the mesh from its bind pose into the world; its matrix and
+    node's transform then count for nothing. weights: of the morph targets at rest, one each.
+    """
 
     name: str
     mesh: int
     world_from_local: NDArray[np.float64]
+    node: int | None = None
+    skin: int | None = None
+    weights: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check the matrix: finite, affine."""
-        _check_affine(self, f"instance '{self.name}'", "world_from_local")
+        """Check the matrix, finite and affine, and the weights."""
+        check_affine(self, f"instance '{self.name}'", "world_from_local")
+        if not np.isfinite(self.weights).all():
+            raise SceneError(
+                f"instance '{self.name}': weights: {self.weights}; give finite numbers"
+            )
 
 
 @dataclass(frozen=True, eq=False)
 class SceneCamera:
-    """A perspective camera of the file, looking along its own −z."""
+    """A perspective camera of the file, looking along its own −z. node: what carries it."""
 
     name: str
     world_from_camera: NDArray[np.float64]
     yfov_rad: float
+    node: int | None = None
 
     def __post_init__(self) -> None:
         """Check the matrix and the field of view."""
         label = f"camera '{self.name}'"
-        _check_affine(self, label, "world_from_camera")
+        check_affine(self, label, "world_from_camera")
         if not 0.0 < self.yfov_rad < np.pi:
             raise SceneError(f"{label}: yfov_rad: {self.yfov_rad}; give an angle from 0 to π")
 
@@ -195,6 +239,7 @@ class Light:
     `intensity` is in lux (directional) or candela (point, spot), `color` linear; `range` is in
     world units, None without end. Spots fade from `inner_cone_rad` to `outer_cone_rad`, measured
     from their axis. Of the matrix only where it stands and turns to counts, not its scale.
+    `node` carries it, at rest by this matrix.
     """
 
     name: str
@@ -205,13 +250,14 @@ class Light:
     range: float | None = None
     inner_cone_rad: float = 0.0
     outer_cone_rad: float = np.pi / 4
+    node: int | None = None
 
     def __post_init__(self) -> None:
         """Check the matrix and ranges."""
         label = f"light '{self.name}'"
         if self.kind not in LIGHT_KINDS:
             raise SceneError(f"{label}: kind: {self.kind!r}; give one of {', '.join(LIGHT_KINDS)}")
-        _check_affine(self, label, "world_from_light")
+        check_affine(self, label, "world_from_light")
         if self.kind != "point" and not np.any(self.world_from_light[:3, 2]):
             raise SceneError(f"{label}: world_from_light: its −z has no length; scale it up")
         powers = (*self.color, self.intensity)
@@ -231,7 +277,8 @@ class Light:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Meshes, where they stand, what they are made of, and lights of their own, if any."""
+    """Meshes, where they stand, what they are made of, lights of their own, if any, and the nodes
+    and skins that move them, in files that have some."""
 
     name: str
     meshes: tuple[Mesh, ...]
@@ -242,6 +289,8 @@ class Scene:
     default_camera: WindowCamera | None = None
     warnings: tuple[str, ...] = ()
     lights: tuple[Light, ...] = ()
+    nodes: Nodes = field(default_factory=Nodes)
+    skins: tuple[Skin, ...] = ()
 
     def __post_init__(self) -> None:
         """Check every index and that something can be drawn."""
@@ -258,27 +307,87 @@ class Scene:
                     f"the scene has {len(self.meshes)}"
                 )
         for material in self.materials:
-            for field, slot in material.texture_slots().items():
+            for role, slot in material.texture_slots().items():
                 if slot.image >= len(self.images):
                     raise SceneError(
-                        f"material '{material.name}': {field}: image {slot.image}; "
+                        f"material '{material.name}': {role}: image {slot.image}; "
                         f"the scene has {len(self.images)}"
                     )
         if len(self.lights) > MOST_LIGHTS:
             raise SceneError(f"lights: {len(self.lights)}; give at most {MOST_LIGHTS}")
         if self.triangle_count == 0:
             raise SceneError("meshes: 0 triangles; give a scene with at least one triangle")
+        self._check_nodes()
+
+    def _check_nodes(self) -> None:
+        """Check what hangs on nodes, and skins."""
+        for skin in self.skins:
+            if int(skin.joints.min()) < 0 or int(skin.joints.max()) >= len(self.nodes):
+                raise SceneError(
+                    f"skin '{skin.name}': joints {int(skin.joints.min())} to "
+                    f"{int(skin.joints.max())}; the scene has {len(self.nodes)} nodes"
+                )
+        for kind, things in (
+            ("instance", self.instances), ("light", self.lights), ("camera", self.cameras),
+        ):  # fmt: skip
+            for thing in things:
+                if thing.node is not None and not 0 <= thing.node < len(self.nodes):
+                    raise SceneError(
+                        f"{kind} '{thing.name}': node: {thing.node}; "
+                        f"the scene has {len(self.nodes)}"
+                    )
+        for instance in self.instances:
+            self._check_deformation(instance)
+
+    def _check_deformation(self, instance: Instance) -> None:
+        """Check an instance's weights and skin against its mesh."""
+        label, mesh = f"instance '{instance.name}'", self.meshes[instance.mesh]
+        if len(instance.weights) != mesh.target_count:
+            raise SceneError(
+                f"{label}: weights: {len(instance.weights)}; mesh '{mesh.name}' has "
+                f"{mesh.target_count} morph targets"
+            )
+        if instance.skin is None:
+            return
+        if not 0 <= instance.skin < len(self.skins):
+            raise SceneError(f"{label}: skin: {instance.skin}; the scene has {len(self.skins)}")
+        joints = len(self.skins[instance.skin].joints)
+        if mesh.influences is None or len(mesh.influences.joint_shares) > joints:
+            named = 0 if mesh.influences is None else len(mesh.influences.joint_shares)
+            raise SceneError(
+                f"{label}: skin: of {joints} joints; mesh '{mesh.name}' names {named}, "
+                f"give it 1 to {joints}"
+            )
 
     @property
     def triangle_count(self) -> int:
         """Triangles drawn: each mesh counts once an instance."""
         return sum(len(self.meshes[i.mesh].triangles) for i in self.instances)
 
+    def deforms(self, instance: Instance) -> bool:
+        """Whether more than a matrix moves an instance's vertices: a skin or morph targets."""
+        return instance.skin is not None or self.meshes[instance.mesh].morph is not None
+
+    def posed(self, pose: Pose | None = None) -> Scene:
+        """The scene as it stands in a pose, at rest by default, without anything left to move:
+        instances in the same order, those that deform each with a mesh of its own. For checks and
+        bounds; the renderer takes poses as they are. Raises SceneError where the pose does not fit.
+        """
+        from lfd_render.scene.pose import Poser  # noqa: PLC0415 (it imports this module)
+
+        return Poser(self).scene(pose)
+
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Smallest and largest world coordinates, each [3] float64, over all instances."""
+        """Smallest and largest world coordinates at rest, each [3] float64, over all instances."""
+        low, high = self._bounds
+        return low.copy(), high.copy()
+
+    @cached_property
+    def _bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        scene = self.posed() if any(self.deforms(i) for i in self.instances) else self
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
-        for instance in self.instances:
-            positions = self.meshes[instance.mesh].positions
+        for instance in scene.instances:
+            positions = scene.meshes[instance.mesh].positions
             world_from_local = instance.world_from_local
             for start in range(0, len(positions), _BOUNDS_CHUNK):
                 chunk = positions[start : start + _BOUNDS_CHUNK].astype(np.float64)
@@ -297,33 +406,3 @@ class Scene:
         from lfd_render.scene.loading import load_scene  # noqa: PLC0415 (the loaders import this module)
 
         return load_scene(source, limits or LoadLimits())
-
-
-def _freeze(
-    owner: Any, label: str, field: str, dtype: type[np.generic], shape: tuple[int | None, ...]
-) -> None:
-    """Check one array field of a frozen dataclass and put a read-only view in its place."""
-    array = getattr(owner, field)
-    wanted = "[" + ", ".join("n" if s is None else str(s) for s in shape) + f"] {dtype.__name__}"
-    if not isinstance(array, np.ndarray):
-        raise SceneError(f"{label}: {field}: {type(array).__name__}; give a numpy array {wanted}")
-    fits = len(array.shape) == len(shape) and all(
-        want in (None, got) for want, got in zip(shape, array.shape, strict=True)
-    )
-    if not fits or array.dtype != dtype:
-        raise SceneError(f"{label}: {field}: {list(array.shape)} {array.dtype}; give {wanted}")
-    # The extremes carry any NaN or infinity and, unlike isfinite, need no array of their own.
-    extremes = (array.min(), array.max()) if array.size else ()
-    if issubclass(dtype, np.floating) and not np.isfinite(extremes).all():
-        row = int(np.argmin(np.isfinite(array.reshape(len(array), -1)).all(axis=1)))
-        raise SceneError(f"{label}: {field}[{row}]: {array[row].tolist()}; give finite numbers")
-    view = array.view()
-    view.setflags(write=False)
-    object.__setattr__(owner, field, view)
-
-
-def _check_affine(owner: Any, label: str, field: str) -> None:
-    _freeze(owner, label, field, np.float64, (4, 4))
-    matrix: NDArray[np.float64] = getattr(owner, field)
-    if not np.array_equal(matrix[3], (0.0, 0.0, 0.0, 1.0)):
-        raise SceneError(f"{label}: {field}: last row {matrix[3].tolist()}; give 0 0 0 1")

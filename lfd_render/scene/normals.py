@@ -9,7 +9,7 @@ Vectors = NDArray[np.float32]
 Triangles = NDArray[np.uint32]
 
 
-def face_normals(positions: Vectors, triangles: Triangles) -> NDArray[np.float64]:
+def face_normals(positions: NDArray[np.floating], triangles: Triangles) -> NDArray[np.float64]:
     """Normal of each triangle, [m, 3], in proportion to its area; counter-clockwise is the front.
 
     Edges are scaled by the longest, so that neither tiny nor huge meshes underflow or overflow.

@@ -276,8 +276,11 @@ def test_morph_targets_stand_at_their_default_weights(gltf: Any) -> None:
     gltf.node(mesh=mesh)
     gltf.node(mesh=mesh, weights=[0, 1])
     scene = Scene.load(gltf.write())
-    np.testing.assert_allclose(scene.meshes[0].positions, TRIANGLE + 1.5, rtol=1e-6)
-    np.testing.assert_allclose(scene.meshes[1].positions, TRIANGLE + 10, rtol=1e-6)
+    assert len(scene.meshes) == 1  # nodes share it
+    first, second = (corners(scene.posed(), instance)[0] for instance in (0, 1))
+    np.testing.assert_allclose(first, TRIANGLE + 1.5, rtol=1e-6)
+    np.testing.assert_allclose(second, TRIANGLE + 10, rtol=1e-6)
+    np.testing.assert_allclose(scene.bounds(), [[1.5, 1.5, 1.5], [11, 11, 10]], rtol=1e-6)
 
 
 def skinned(gltf: Any, normals: np.ndarray | None = None, **joint: Any) -> None:
@@ -300,7 +303,9 @@ def test_skins_stand_in_the_pose_of_their_joints(gltf: Any) -> None:
     skinned(gltf)
     # The node's own translation is ignored; weights are scaled to a sum of one.
     expected = TRIANGLE + np.array([[0, 0, 0], [0, 0, 0], [5, 0, 0]])
-    np.testing.assert_allclose(corners(Scene.load(gltf.write()))[0], expected, atol=1e-6)
+    scene = Scene.load(gltf.write())
+    np.testing.assert_allclose(corners(scene.posed())[0], expected, atol=1e-6)
+    np.testing.assert_allclose(scene.bounds()[1], [5, 1, 0], atol=1e-6)
 
 
 def test_a_mirroring_skin_turns_its_triangles(gltf: Any) -> None:
@@ -308,9 +313,11 @@ def test_a_mirroring_skin_turns_its_triangles(gltf: Any) -> None:
     gltf.json["nodes"][0] = {"scale": [1, 1, -1]}
     gltf.json["nodes"][1] = {"scale": [1, 1, -1], "translation": [1, 2, -3]}
     scene = Scene.load(gltf.write())
+    scene = scene.posed()
     (face,) = corners(scene)
     normal = np.cross(face[1] - face[0], face[2] - face[0])
-    np.testing.assert_allclose(scene.meshes[0].normals, np.tile([0, 0, -1], (3, 1)), atol=1e-6)
+    mesh = scene.meshes[scene.instances[0].mesh]
+    np.testing.assert_allclose(mesh.normals, np.tile([0, 0, -1], (3, 1)), atol=1e-6)
     assert normal[2] < 0
 
 
