@@ -36,8 +36,24 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("vec4", "normal_matrix_z"),
         ("uint", "material"),
         ("uint", "facing"),  # FACING_* below
-        ("uint", "unused_0"),
-        ("uint", "unused_1"),
+        ("uint", "first_joint"),  # of draws that deform: where their joints and
+        ("uint", "first_weight"),  # morph weights start
+    ),
+    # display_from_bind of a joint, or of a draw that deforms without joints: three rows.
+    "JointMatrix": (
+        ("vec4", "row_x"),
+        ("vec4", "row_y"),
+        ("vec4", "row_z"),
+    ),
+    # How far a morph target of weight 1 moves a vertex and its normal.
+    "MorphDelta": (
+        ("uint", "target"),
+        ("float", "position_x"),
+        ("float", "position_y"),
+        ("float", "position_z"),
+        ("float", "normal_x"),
+        ("float", "normal_y"),
+        ("float", "normal_z"),
     ),
     # What few scenes have at a vertex.
     "VertexExtra": (

@@ -1,8 +1,8 @@
 """A scene on the device: batches of triangles, draws, materials and textures.
 
 A batch holds triangles of one alpha mode, of as many draws as fit the limits; ids of triangles run
-through the batches. What depends on the camera, the draws' matrices, is written each frame;
-everything else is uploaded once.
+through the batches. What depends on the camera and the pose, matrices and weights, is written each
+frame; everything else is uploaded once.
 """
 
 from __future__ import annotations
@@ -16,11 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.errors import SceneError
+from lfd_render.gpu.deform import (
+    BATCH_DELTAS,
+    BatchDeform,
+    Deformation,
+    VertexDeform,
+    vertex_deform,
+)
 from lfd_render.gpu.layout import CONSTANTS, TEXTURE_ROLES, dtype
 from lfd_render.gpu.lighting import Lighting
 from lfd_render.gpu.memory import Buffer, TextureArray
 from lfd_render.gpu.textures import MaterialTextures
-from lfd_render.scene import Material, Mesh, Scene
+from lfd_render.scene import Material, Mesh, Pose, Poser, Scene
 from lfd_render.scene.model import ALPHA_MODES, AlphaMode
 
 if TYPE_CHECKING:
@@ -65,16 +72,29 @@ class _Part:
     positions: NDArray[np.float32]
     attributes: _Attributes
     triangles: NDArray[np.uint32]
+    deform: VertexDeform | None
+
+    @property
+    def kind(self) -> int:
+        """Vertices lie in this order in a batch: rigid, deformed, deformed with flat normals."""
+        return 0 if self.deform is None else 1 + self.deform.flat
 
 
 class Batch:
-    """Buffers of one batch. `triangle_base` is the id of its first triangle."""
+    """Buffers of one batch. `triangle_base` is the id of its first triangle. Its first
+    `rigid_vertices` go by their draws' matrices alone, the others by `deform`."""
 
     def __init__(
         self, device: Device, parts: list[_Part], triangle_base: int, alpha_mode: AlphaMode
     ) -> None:
         vertex_counts = [len(part.positions) for part in parts]
-        starts = np.concatenate(([0], np.cumsum(vertex_counts)[:-1]))
+        in_order = sorted(parts, key=lambda part: part.kind)
+        ends = np.cumsum([len(part.positions) for part in in_order])
+        start_of = {
+            id(part): int(end) - len(part.positions)
+            for part, end in zip(in_order, ends, strict=True)
+        }
+        starts = [start_of[id(part)] for part in parts]
         self.triangle_base = triangle_base
         self.alpha_mode = alpha_mode
         self.vertices = int(sum(vertex_counts))
@@ -92,7 +112,7 @@ class Batch:
             corners[row:end, :3] = part.triangles + np.uint32(start)
             corners[row:end, 3] = part.draw
             row = end
-        attributes = [part.attributes for part in parts]
+        attributes = [part.attributes for part in in_order]
         self.local_positions = Buffer.of(device, "positions", positions)
         self.display_positions = Buffer(device, "display positions", positions.nbytes)
         normals = np.concatenate([a.normals for a in attributes])
@@ -105,6 +125,13 @@ class Batch:
             device, "vertex extras", np.concatenate([a.extras for a in attributes])
         )
         self.corners = Buffer.of(device, "triangles", corners)
+        self.rigid_vertices = sum(len(part.positions) for part in parts if part.kind == 0)
+        smooth = sum(len(part.positions) for part in parts if part.kind == 1)
+        deforms = [part.deform for part in in_order if part.deform is not None]
+        self.deform: BatchDeform | None = None
+        if deforms:
+            first = self.rigid_vertices
+            self.deform = BatchDeform(device, deforms, first, first + smooth)
 
     def corner_indices(self) -> NDArray[np.uint32]:
         """Vertices of the triangles, [triangle, 3], for draws. Waits for the device."""
@@ -126,6 +153,8 @@ class Batch:
             self.uv0, self.extras, self.corners,
         ):  # fmt: skip
             buffer.release()
+        if self.deform:
+            self.deform.release()
 
 
 class SceneBuffers:
@@ -136,16 +165,17 @@ class SceneBuffers:
         self.textures = MaterialTextures(device, scene.materials, scene.images)
         self.lighting = Lighting(device, scene.lights)
         self.warnings = [*scene.warnings, *self.textures.warnings]
-        self._world_from_local = np.stack([i.world_from_local for i in scene.instances])
-        normal = _cofactors(self._world_from_local[:, :3, :3])
         self._records = np.zeros(len(scene.instances), dtype("Draw"))
-        for axis, field in enumerate(("x", "y", "z")):
-            # Normals are normalised where they are used; only the largest entry must be near 1.
-            scale = np.maximum(np.abs(normal).max(axis=(1, 2), keepdims=True), 1e-300)
-            self._records[f"normal_matrix_{field}"][:, :3] = (normal / scale)[:, :, axis]
+        self._poser = Poser(scene)
+        self.pose(None)
         self._records["material"] = [scene.meshes[i.mesh].material for i in scene.instances]
         sided = np.array([m.double_sided for m in scene.materials])
         self._double_sided = sided[self._records["material"]]
+        self.deformation: Deformation | None = None
+        if any(scene.deforms(instance) for instance in scene.instances):
+            self.deformation = Deformation(device, scene, self._poser)
+            self._records["first_joint"] = self.deformation.first_joint
+            self._records["first_weight"] = self.deformation.first_weight
         self.draws = Buffer(device, "draws", self._records.nbytes)
         self.materials = Buffer.of(device, "materials", _material_records(scene))
         self.slots = Buffer.of(device, "materials", self.textures.slots)
@@ -163,10 +193,23 @@ class SceneBuffers:
         self.triangles = base
         device.check()
 
+    def pose(self, pose: Pose | None) -> None:
+        """Stand the scene in a pose, by default at rest, from the next `place` on.
+
+        Raises SceneError if it does not fit.
+        """
+        self._posed = self._poser(pose)
+        normal = _cofactors(self._posed.world_from_instance[:, :3, :3])
+        for axis, field in enumerate(("x", "y", "z")):
+            # Normals are normalised where they are used; only the largest entry must be near 1.
+            scale = np.maximum(np.abs(normal).max(axis=(1, 2), keepdims=True), 1e-300)
+            self._records[f"normal_matrix_{field}"][:, :3] = (normal / scale)[:, :, axis]
+        self.lighting.world_from_light = self._posed.world_from_light
+
     def place(self, display_from_world: NDArray[np.float64]) -> None:
-        """Write the draws for a camera. display_from_world: float64 [4, 4]."""
+        """Write the draws for a camera, in the pose. display_from_world: float64 [4, 4]."""
         with np.errstate(over="ignore", invalid="ignore"):
-            matrices = display_from_world @ self._world_from_local
+            matrices = display_from_world @ self._posed.world_from_instance
             words = matrices.transpose(0, 2, 1).reshape(-1, 16).astype(np.float32)
         if not np.isfinite(words).all():
             name = self.scene.instances[int(np.argmin(np.isfinite(words).all(axis=1)))].name
@@ -175,12 +218,18 @@ class SceneBuffers:
                 "beside the camera's window for single precision; scale it or move the camera"
             )
         self._records["display_from_local"] = words
-        mirrored = np.linalg.det(matrices[:, :3, :3]) < 0.0
+        mirrored = (np.linalg.det(matrices[:, :3, :3]) < 0.0) != self._posed.mirrored
         self._records["facing"] = np.where(mirrored, CONSTANTS["FACING_MIRRORED"], 0) | np.where(
             self._double_sided, CONSTANTS["FACING_BOTH"], 0
         )
         self.draws.write(self._records)
+        if self.deformation:
+            self.deformation.place(display_from_world, self._posed)
         self.lighting.place(display_from_world)
+        # How planes go the other way: n_world = Mᵗ·n_display for M = display_from_world.
+        linear = display_from_world[:3, :3]
+        self.world_from_display_plane = np.eye(4)
+        self.world_from_display_plane[:3, :3] = linear.T / np.abs(linear).max()
 
     def runs(self, batch: Batch) -> list[DrawRun]:
         """The batch's triangles in runs of equal raster state."""
@@ -237,6 +286,8 @@ class SceneBuffers:
             batch.release()
         for buffer in (self.draws, self.materials, self.slots, self.uv_transforms):
             buffer.release()
+        if self.deformation:
+            self.deformation.release()
         self.textures.release()
         self.lighting.release()
 
@@ -275,19 +326,25 @@ def _shares_occlusion(material: Material) -> bool:
 def _batches(scene: Scene, alpha_mode: AlphaMode, *, extras: bool) -> Iterator[list[_Part]]:
     """Parts of all draws of one alpha mode, in lists that fit a batch."""
     parts: list[_Part] = []
-    triangles = vertices = 0
+    triangles = vertices = deltas = 0
     attributes: dict[int, _Attributes] = {}
+    deforms: dict[tuple[int, bool], VertexDeform] = {}
     for draw, instance in enumerate(scene.instances):
         mesh = scene.meshes[instance.mesh]
         if scene.materials[mesh.material].alpha_mode != alpha_mode:
             continue
         if instance.mesh not in attributes:
             attributes[instance.mesh] = _attributes(mesh, extras=extras)
-        for part in _split(draw, mesh, attributes[instance.mesh]):
+        key = instance.mesh, instance.skin is not None
+        if scene.deforms(instance) and key not in deforms:
+            deforms[key] = vertex_deform(mesh, skinned=key[1])
+        for part in _split(draw, mesh, attributes[instance.mesh], deforms.get(key)):
             full = triangles + len(part.triangles) > BATCH_TRIANGLES
-            if parts and (full or vertices + len(part.positions) > BATCH_VERTICES):
+            full |= vertices + len(part.positions) > BATCH_VERTICES
+            if parts and (full or deltas + _new_deltas(part, parts) > BATCH_DELTAS):
                 yield parts
-                parts, triangles, vertices = [], 0, 0
+                parts, triangles, vertices, deltas = [], 0, 0, 0
+            deltas += _new_deltas(part, parts)
             parts.append(part)
             triangles += len(part.triangles)
             vertices += len(part.positions)
@@ -295,16 +352,30 @@ def _batches(scene: Scene, alpha_mode: AlphaMode, *, extras: bool) -> Iterator[l
         yield parts
 
 
-def _split(draw: int, mesh: Mesh, vertices: _Attributes) -> Iterator[_Part]:
+def _new_deltas(part: _Part, parts: list[_Part]) -> int:
+    """Displacements that a part adds to a batch, whose draws of one mesh share them."""
+    deform = part.deform
+    if deform is None or not len(deform.deltas):
+        return 0
+    return 0 if any(deform is other.deform for other in parts) else len(deform.deltas)
+
+
+def _split(
+    draw: int, mesh: Mesh, vertices: _Attributes, deform: VertexDeform | None
+) -> Iterator[_Part]:
     """One mesh in parts that fit a batch; nearly always it fits whole."""
-    if len(mesh.triangles) <= BATCH_TRIANGLES and len(mesh.positions) <= BATCH_VERTICES:
-        yield _Part(draw, mesh.positions, vertices, mesh.triangles)
+    fits = deform is None or len(deform.deltas) <= BATCH_DELTAS
+    if fits and len(mesh.triangles) <= BATCH_TRIANGLES and len(mesh.positions) <= BATCH_VERTICES:
+        yield _Part(draw, mesh.positions, vertices, mesh.triangles, deform)
         return
     step = min(BATCH_TRIANGLES, BATCH_VERTICES // 3)  # even if no two triangles share a vertex
+    if deform is not None:
+        step = min(step, max(1, BATCH_DELTAS // max(1, 3 * deform.most_deltas)))
     for first in range(0, len(mesh.triangles), step):
         used, triangles = np.unique(mesh.triangles[first : first + step], return_inverse=True)
         corners = triangles.reshape(-1, 3).astype(np.uint32)
-        yield _Part(draw, mesh.positions[used], vertices.of(used), corners)
+        cut = None if deform is None else deform.of(used)
+        yield _Part(draw, mesh.positions[used], vertices.of(used), corners, cut)
 
 
 def _attributes(mesh: Mesh, *, extras: bool) -> _Attributes:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lfd_render.scene import Instance, Mesh, Scene
+from lfd_render.scene import Instance, Mesh, Pose, Poser, Scene
 
 Float64 = NDArray[np.float64]
 
@@ -48,21 +48,31 @@ def ordered_instances(scene: Scene) -> Iterator[tuple[int, Instance, Mesh]]:
                 yield index, instance, mesh
 
 
-def placed(scene: Scene, display_from_world: Float64) -> Triangles:
-    """The triangles of a scene before a display. display_from_world: float64 [4, 4], affine."""
+def placed(scene: Scene, display_from_world: Float64, pose: Pose | None = None) -> Triangles:
+    """The triangles of a scene before a display, in a pose, by default at rest.
+
+    display_from_world: float64 [4, 4], affine.
+    """
+    poser = Poser(scene)
+    posed = poser(pose)
     p_display, normals, texcoords, colors, material, instances = [], [], [], [], [], []
     mirrored, double_sided, blended = [], [], []
     for index, instance, mesh in ordered_instances(scene):
         corners = mesh.triangles
-        display_from_local = display_from_world @ instance.world_from_local
+        p_local, n_local = mesh.positions.astype(np.float64), mesh.normals.astype(np.float64)
+        if scene.deforms(instance):
+            p_local, n_local = poser.vertices(index, posed)
+        world_from_local = posed.world_from_instance[index]
+        display_from_local = display_from_world @ world_from_local
         count = len(corners)
-        p_display.append(points_by(display_from_local, mesh.positions)[corners])
-        normals.append(normals_by(instance.world_from_local, mesh.normals)[corners])
+        p_display.append(points_by(display_from_local, p_local)[corners])
+        normals.append(normals_by(world_from_local, n_local)[corners])
         texcoords.append(mesh.texcoords.astype(np.float64)[corners])
         colors.append(mesh.colors.astype(np.float64)[corners])
         material.append(np.full(count, mesh.material))
         instances.append(np.full(count, index))
-        mirrored.append(np.full(count, np.linalg.det(display_from_local[:3, :3]) < 0.0))
+        turned_over = (np.linalg.det(display_from_local[:3, :3]) < 0.0) != posed.mirrored[index]
+        mirrored.append(np.full(count, turned_over))
         kind = scene.materials[mesh.material]
         double_sided.append(np.full(count, kind.double_sided))
         blended.append(np.full(count, kind.alpha_mode == "blend"))

@@ -159,22 +159,28 @@ class Poser:
             skins=(),
         )
 
-    def _mesh(self, index: int, posed: Posed) -> Mesh:
-        """The mesh of an instance as it lies."""
+    def vertices(self, index: int, posed: Posed) -> tuple[Float64, Float64]:
+        """Positions and unit normals, float64 [n, 3], of an instance's mesh as it lies before its
+        matrix in `posed`."""
         instance = self._scene.instances[index]
         mesh = self._scene.meshes[instance.mesh]
         first = self.first_weight[index]
         weights = posed.weights[first : first + len(instance.weights)]
         matrices = None
         if instance.skin is not None:
-            first = self.first_joint[index]
-            matrices = posed.world_from_bind[first:]
+            matrices = posed.world_from_bind[self.first_joint[index] :]
         positions, normals = deformed(mesh, weights, matrices)
+        return positions, -normals if mesh.flat and posed.mirrored[index] else normals
+
+    def _mesh(self, index: int, posed: Posed) -> Mesh:
+        """The mesh of an instance as it lies, its triangles turned round where the skin mirrors."""
+        mesh = self._scene.meshes[self._scene.instances[index].mesh]
+        positions, normals = self.vertices(index, posed)
         mirrored = bool(posed.mirrored[index])
         return replace(
             mesh,
             positions=positions.astype(np.float32),
-            normals=(-normals if mirrored and mesh.flat else normals).astype(np.float32),
+            normals=normals.astype(np.float32),
             triangles=np.ascontiguousarray(mesh.triangles[:, ::-1]) if mirrored else mesh.triangles,
             flat=False,
             morph=None,

@@ -29,7 +29,7 @@ from lfd_render.passes.transform import Transform
 from lfd_render.passes.view_buffers import choose_winners, make_view_buffers
 from lfd_render.passes.view_target import Band, ViewTarget
 from lfd_render.reference import Triangles, placed
-from lfd_render.scene import Environment, Image, Instance, Material, Mesh, Scene, TextureSlot
+from lfd_render.scene import Environment, Image, Instance, Material, Mesh, Pose, Scene, TextureSlot
 from lfd_render.techniques.lfdpr import SOURCES
 
 FULL = os.environ.get("LFD_FULL") == "1"
@@ -250,13 +250,14 @@ class Passes:
         winners: str = "auto",
         sampling: Sampling = DEFAULT_SAMPLING,
         background: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        pose: Pose | None = None,
         seed: int = 0,
         environment: str | Environment = "studio",
         turn_rad: float = 0.0,
         intensity: float = 1.0,
         lod: str = "area",
     ) -> None:
-        self.scene, self.rig, self.grid = scene, rig, grid
+        self.scene, self.rig, self.grid, self.pose = scene, rig, grid, pose
         self.display_from_world = np.eye(4) if display_from_world is None else display_from_world
         self.placement = Placement(self.display_from_world, background)
         self.buffers = SceneBuffers(device, scene)
@@ -292,6 +293,7 @@ class Passes:
         self.views = make_view_buffers(device, self.target, int64=self.int64)
         self.shade = Shade(*common, self.views.word_stride, lod=lod, sampling=sampling)
         self.points = [self.sample.allocate(batch) for batch in self.buffers.batches]
+        self.buffers.pose(pose)
         self.buffers.place(self.display_from_world)
         for batch in self.buffers.batches:
             self.transform(self.buffers, batch)
@@ -334,7 +336,7 @@ class Passes:
             .astype(np.float64)
             for batch in self.buffers.batches
         ]
-        expected = placed(self.scene, self.display_from_world)
+        expected = placed(self.scene, self.display_from_world, self.pose)
         return dataclasses.replace(expected, p_display=np.concatenate(p_display))
 
     def rows(self) -> tuple[NDArray[np.void], NDArray[np.float32]]:

@@ -1,0 +1,82 @@
+// Vertices of deformed meshes, local or bind space → display space, and their normals → world: morph
+// targets first, then the blend of their joints' matrices (glTF 2.0, sections 3.7.2.2 and 3.7.3.3).
+// A draw that no skin moves has one joint, its placement.
+// In: LocalPositions (xyz, draw index as bits), LocalNormals, Draws, and for each deformed vertex
+// DeltaRanges (its entries of MorphDeltas) and sets of four InfluenceJoints (2 × 16 bits) and weights.
+// Out: DisplayPositions (xyz, w = 1), WorldNormals; those of flat meshes are transform/flat.comp's.
+
+layout(local_size_x = 128) in;
+
+#include "layout/Draw"
+#include "layout/JointMatrix"
+#include "layout/MorphDelta"
+#include "common/octahedral.glsl"
+
+layout(std430) readonly restrict buffer LocalPositions { vec4 local_positions[]; };
+layout(std430) readonly restrict buffer LocalNormals { uint local_normals[]; };
+layout(std430) readonly restrict buffer Draws { Draw draws[]; };
+layout(std430) readonly restrict buffer DeltaRanges { uvec2 delta_ranges[]; };
+layout(std430) readonly restrict buffer MorphDeltas { MorphDelta morph_deltas[]; };
+layout(std430) readonly restrict buffer MorphWeights { float morph_weights[]; };
+layout(std430) readonly restrict buffer InfluenceJoints { uvec2 influence_joints[]; };
+layout(std430) readonly restrict buffer InfluenceWeights { vec4 influence_weights[]; };
+layout(std430) readonly restrict buffer JointMatrices { JointMatrix joint_matrices[]; };
+layout(std430) writeonly restrict buffer DisplayPositions { vec4 display_positions[]; };
+layout(std430) writeonly restrict buffer WorldNormals { uint world_normals[]; };
+
+uniform uint first;     // vertex of the batch that deforms
+uniform uint vertices;  // that deform
+uniform uint sets;      // of influences a vertex
+uniform mat4 world_from_display_plane;
+
+JointMatrix plus(JointMatrix sum, uint joint, float weight) {
+    return JointMatrix(sum.row_x + weight * joint_matrices[joint].row_x,
+                       sum.row_y + weight * joint_matrices[joint].row_y,
+                       sum.row_z + weight * joint_matrices[joint].row_z);
+}
+
+// What takes a vertex to display space.
+JointMatrix blended(uint deformed, uint first_joint) {
+    if (sets == 0u) return joint_matrices[first_joint];
+    JointMatrix sum = JointMatrix(vec4(0.0), vec4(0.0), vec4(0.0));
+    for (uint i = deformed * sets; i < deformed * sets + sets; i++) {
+        uvec2 joints = influence_joints[i];
+        vec4 weights = influence_weights[i];
+        sum = plus(sum, first_joint + (joints.x & 0xFFFFu), weights.x);
+        sum = plus(sum, first_joint + (joints.x >> 16), weights.y);
+        sum = plus(sum, first_joint + (joints.y & 0xFFFFu), weights.z);
+        sum = plus(sum, first_joint + (joints.y >> 16), weights.w);
+    }
+    return sum;
+}
+
+// A normal by the inverse transpose times |determinant|, which flattened matrices have too.
+vec3 turned(JointMatrix matrix, vec3 normal) {
+    vec3 size = max(abs(matrix.row_x.xyz), max(abs(matrix.row_y.xyz), abs(matrix.row_z.xyz)));
+    float scale = 1.0 / max(max(size.x, max(size.y, size.z)), 1e-30);  // products stay in range
+    vec3 x = scale * matrix.row_x.xyz, y = scale * matrix.row_y.xyz, z = scale * matrix.row_z.xyz;
+    vec3 along = vec3(dot(cross(y, z), normal), dot(cross(z, x), normal), dot(cross(x, y), normal));
+    return dot(x, cross(y, z)) < 0.0 ? -along : along;
+}
+
+void main() {
+    uint deformed = gl_GlobalInvocationID.x;
+    if (deformed >= vertices) return;
+    uint vertex = first + deformed;
+    vec4 local = local_positions[vertex];
+    uint draw = floatBitsToUint(local.w);
+    vec3 position = local.xyz;
+    vec3 normal = direction_from(local_normals[vertex]);
+    uint first_weight = draws[draw].first_weight;
+    uvec2 range = delta_ranges[deformed];
+    for (uint i = range.x; i < range.y; i++) {
+        MorphDelta delta = morph_deltas[i];
+        float weight = morph_weights[first_weight + delta.target];
+        position += weight * vec3(delta.position_x, delta.position_y, delta.position_z);
+        normal += weight * vec3(delta.normal_x, delta.normal_y, delta.normal_z);
+    }
+    JointMatrix matrix = blended(deformed, draws[draw].first_joint);
+    vec4 p = vec4(position, 1.0);
+    display_positions[vertex] = vec4(dot(matrix.row_x, p), dot(matrix.row_y, p), dot(matrix.row_z, p), 1.0);
+    world_normals[vertex] = word_from((world_from_display_plane * vec4(turned(matrix, normal), 0.0)).xyz);
+}
