@@ -2,5 +2,6 @@
 
 from lfd_render.renderer.options import RenderOptions
 from lfd_render.renderer.renderer import Renderer, camera_for
+from lfd_render.renderer.stage import Stage
 
-__all__ = ["RenderOptions", "Renderer", "camera_for"]
+__all__ = ["RenderOptions", "Renderer", "Stage", "camera_for"]

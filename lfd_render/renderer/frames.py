@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import statistics
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -19,13 +20,17 @@ from lfd_render.passes.placement import Placement
 from lfd_render.passes.weave import Weave
 from lfd_render.techniques import Technique
 
+_FRAMES = 1024  # timed at most
+
 
 @dataclass
 class Timings:
-    """Milliseconds of one call: what is done once, and each frame's stages and whole."""
+    """Milliseconds: what is done once, and the stages and whole of each of the last frames."""
 
     once: dict[str, float] = field(default_factory=dict)
-    frames: list[tuple[float, dict[str, float]]] = field(default_factory=list)
+    frames: deque[tuple[float, dict[str, float]]] = field(
+        default_factory=lambda: deque(maxlen=_FRAMES)
+    )
 
     def measure(self, name: str, device: Device, work: Callable[[], Any]) -> Any:
         """Run something once, timed to an idle device."""
@@ -46,12 +51,9 @@ class Timings:
 class PanelFrames:
     """Frames of one technique, from camera to encoded panel image."""
 
-    def __init__(
-        self, device: Device, technique: Technique, display: DisplayProfile, exposure: float
-    ) -> None:
+    def __init__(self, device: Device, technique: Technique, display: DisplayProfile) -> None:
         self.technique = technique
         self._device = device
-        self._exposure = exposure
         target = technique.target
         self._weave = Weave(device, display, target.grid, target.rig.views)
         self._encode = Encode(device, *display.resolution_px)
@@ -62,9 +64,9 @@ class PanelFrames:
         self.technique.begin(placement, clock)
         self.technique.warm_up(clock)
         self._weave(self.technique.target.warm_up_band)
-        self._encode(self._weave.panel, 0, self._exposure)
+        self._encode(self._weave.panel, 0, 1.0)
 
-    def run(self, placement: Placement) -> tuple[float, dict[str, float]]:
+    def run(self, placement: Placement, exposure: float) -> tuple[float, dict[str, float]]:
         """One frame: its milliseconds, whole and by stage."""
         complete = False
         while not complete:
@@ -77,7 +79,7 @@ class PanelFrames:
                 with clock.stage("weave"):
                     self._weave(band)
             with clock.stage("encode_srgb"):
-                self._encode(self._weave.panel, 0, self._exposure)
+                self._encode(self._weave.panel, 0, exposure)
             self._device.finish()
             elapsed_ms = 1000.0 * (time.perf_counter() - start)
             complete = self.technique.complete()

@@ -1,10 +1,9 @@
-"""Renders scenes for displays: uploads what is new, and runs a technique's frames."""
+"""Renders scenes for displays: uploads what is new, and stages it for a technique's frames."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
 from types import TracebackType
 from typing import Any
 
@@ -24,10 +23,10 @@ from lfd_render.passes.prefilter import Prefilter
 from lfd_render.passes.view_target import ViewTarget
 from lfd_render.renderer.frames import PanelFrames, Timings
 from lfd_render.renderer.options import MOST_VIEWS, RenderOptions
-from lfd_render.scene import Environment, Scene
+from lfd_render.renderer.stage import REPEAT_TURN_RAD, Stage, check_in_front
+from lfd_render.scene import Environment, Pose, Scene
 from lfd_render.techniques import Lfdpr, Mvr, Technique
 
-REPEAT_TURN_RAD = np.deg2rad(0.5)  # how far the scene turns between repeated frames
 MOST_VIEW_PIXELS = 1 << 32  # of all views together: hours on a processor, and far above any panel
 
 
@@ -36,7 +35,7 @@ class Renderer:
 
     device: ``auto``, ``gpu``, ``software``, an EGL index, or an open Device, which stays the
     caller's to close. Raises GpuError without OpenGL 4.5. The scene of the last call stays
-    uploaded, so that rendering it again is quick.
+    uploaded, and staged if it was `render`, so that rendering it again is quick.
     """
 
     def __init__(self, device: str | Device = "auto") -> None:
@@ -48,6 +47,7 @@ class Renderer:
         self._buffers: SceneBuffers | None = None
         self._environment: Environment | None = None
         self._environment_map: EnvironmentMap | None = None
+        self._stage: Stage | None = None
 
     def __enter__(self) -> Renderer:
         return self
@@ -65,6 +65,7 @@ class Renderer:
         if self.device.closed:
             return
         self.device.activate()
+        self._end_stage()
         self._drop_scene()
         self._drop_environment()
         if self._owns_device:
@@ -76,68 +77,96 @@ class Renderer:
         display: DisplayProfile,
         camera: Camera | None = None,
         views: int | None = None,
+        *,
+        pose: Pose | None = None,
         **options: Any,
     ) -> Eia:
         """Render a scene into the panel image of a display.
 
         camera: where the display's window stands in the world; None uses the scene's own or frames
-        it. views: number of views, the profile's by default. options: those of RenderOptions.
+        it. views: number of views, the profile's by default. pose: how the scene's nodes stand, by
+        default at rest. options: those of RenderOptions. What the call needed stays ready as a
+        `Stage` for a next call with the same scene, display and options.
         Raises SceneError, UsageError, ResourceError or GpuError.
+        """
+        _check_kinds(scene, display, camera, pose)
+        choice = RenderOptions(views=views, **options)
+        camera = camera or camera_for(scene, display)
+        self._end_other_stage(scene, display, choice)
+        with self._call():
+            stage = self._staged(scene, display, camera, choice, pose)
+            for index in range(choice.repeat):
+                turn = (index - choice.repeat + 1) * float(REPEAT_TURN_RAD)
+                stage.run(camera.turned(turn), pose, choice)
+            return stage.result(choice)
+
+    def stage(
+        self,
+        scene: Scene,
+        display: DisplayProfile,
+        camera: Camera | None = None,
+        views: int | None = None,
+        **options: Any,
+    ) -> Stage:
+        """A scene before a display with everything compiled and allocated, for many frames.
+
+        camera: what frames take that are given none. Otherwise as `render`. Asked again for the
+        same scene, display and options but exposure and background, it gives the same stage, with
+        the new ones; asked for others it ends the one before.
         """
         _check_kinds(scene, display, camera)
         choice = RenderOptions(views=views, **options)
+        self._end_other_stage(scene, display, choice)
         with self._call():
-            return self._render(scene, display, camera or camera_for(scene, display), choice)
+            stage = self._staged(scene, display, camera or camera_for(scene, display), choice)
+        stage.choice = choice
+        stage.camera = camera or camera_for(scene, display)
+        return stage
 
-    def _render(
-        self, scene: Scene, display: DisplayProfile, camera: Camera, choice: RenderOptions
-    ) -> Eia:
+    def _staged(
+        self,
+        scene: Scene,
+        display: DisplayProfile,
+        camera: Camera,
+        choice: RenderOptions,
+        pose: Pose | None = None,
+    ) -> Stage:
+        """The stage for these, which may be there already, warmed up by this camera and pose."""
+        if self._stage is not None:
+            return self._stage
         rig = display.rig(choice.views, choice.spacing)
         grid = _grid(display, choice, rig.views)
         _check_size(grid, rig.views)
-        _check_in_front(scene, camera, rig)
+        if pose is None:
+            check_in_front(scene, camera, rig)
         timings = Timings()
         buffers = self._upload(scene, choice, timings)
+        buffers.pose(pose)
 
         def compile_all() -> PanelFrames:
             technique = self._technique(buffers, rig, grid, choice)
-            frames = PanelFrames(self.device, technique, display, choice.exposure)
+            frames = PanelFrames(self.device, technique, display)
             frames.warm_up(Placement(camera.display_from_world(rig.panel_mm), choice.background))
             return frames
 
         frames = timings.measure("compile", self.device, compile_all)
-        for index in range(choice.repeat):
-            turned = camera.turned((index - choice.repeat + 1) * float(REPEAT_TURN_RAD))
-            matrix = turned.display_from_world(rig.panel_mm)
-            timings.frames.append(frames.run(Placement(matrix, choice.background)))
-        linear, pixels = timings.measure("read", self.device, frames.read)
-        report = {
-            "technique": choice.technique,
-            "preset": choice.preset,
-            "lod": choice.lod_rule,
-            "views": rig.views,
-            "view_size": [grid.columns, grid.rows],
-            "view_grid": grid.kind,
-            "triangles": scene.triangle_count,
-            **_point_report(frames.technique, choice),
-            "renderer": self.device.name,
-            "device_bytes": self.device.ledger.peak,
-            "warnings": list(buffers.warnings),
-            "camera": camera.to_json_dict(),
-            "timings_ms": timings.summary(),
-        }
-        self.device.check()
-        frames.release()
-        if choice.technique == "lfdpr" and report["points"] == 0:
-            report["warnings"].append("nothing of the scene can be seen through the window")
-        metadata = {
-            "lfd:profile": display.name,
-            "lfd:profile-hash": display.hash,
-            "lfd:views": str(rig.views),
-            "lfd:technique": choice.technique,
-            "lfd:seed": str(choice.seed),
-        }
-        return Eia(pixels, linear, report, metadata)
+        self._stage = Stage(
+            self.device, scene, display, choice,
+            camera=camera, buffers=buffers, frames=frames, timings=timings, call=self._call,
+        )  # fmt: skip
+        return self._stage
+
+    def _end_other_stage(
+        self, scene: Scene, display: DisplayProfile, choice: RenderOptions
+    ) -> None:
+        """End the stage there is unless it serves these."""
+        if self._stage is not None and not self._stage.serves(scene, display, choice):
+            self._end_stage()
+
+    def _end_stage(self) -> None:
+        if self._stage is not None:
+            self._stage.close()
+            self._stage = None
 
     def views(
         self,
@@ -146,6 +175,8 @@ class Renderer:
         camera: Camera | None = None,
         views: int | None = None,
         rig: Rig | None = None,
+        *,
+        pose: Pose | None = None,
         **options: Any,
     ) -> NDArray[np.uint8]:
         """Render single upright views, uint8 [view, y, x, 3], view 0 leftmost.
@@ -153,11 +184,13 @@ class Renderer:
         rig: eyes other than the display's own, for example `Rig.single(display, angle)`. The view
         size is by default one column a lens and the default rows. Otherwise as `render`.
         """
-        _check_kinds(scene, display, camera)
+        _check_kinds(scene, display, camera, pose)
         choice = RenderOptions(views=views, **options)
         rig = rig or display.rig(choice.views, choice.spacing)
+        camera = camera or camera_for(scene, display)
+        self._end_stage()
         with self._call():
-            return self._views(scene, display, camera or camera_for(scene, display), rig, choice)
+            return self._views(scene, display, camera, rig, choice, pose=pose)
 
     def _views(
         self,
@@ -166,12 +199,16 @@ class Renderer:
         camera: Camera,
         rig: Rig,
         choice: RenderOptions,
+        *,
+        pose: Pose | None,
     ) -> NDArray[np.uint8]:
         width, height = choice.view_size or upright_size(display, display.views)
         grid = ViewGrid.upright(display, width, height)
         _check_size(grid, rig.views)
-        _check_in_front(scene, camera, rig)
+        if pose is None:
+            check_in_front(scene, camera, rig)
         buffers = self._upload(scene, choice, Timings())
+        buffers.pose(pose)
         technique = self._technique(buffers, rig, grid, choice)
         encode = Encode(self.device, grid.columns, technique.target.images.height)
         pictures = np.empty((rig.views, grid.rows, grid.columns, 3), np.uint8)
@@ -196,12 +233,17 @@ class Renderer:
         """One rendering call: nothing of it stays on the device when it fails."""
         self.device.activate()
         self.device.ledger.restart_peak()
+        before = set(self.device.owned)
         try:
             with self.device.undoing():
                 yield
-        except BaseException:
-            self._drop_scene()  # they may be among what was undone
-            self._drop_environment()
+        except BaseException as error:
+            # What a bad scene, pose or camera finds standing stands, unless something was replaced.
+            harmless = isinstance(error, SceneError | UsageError)
+            if not (harmless and set(self.device.owned) == before):
+                self._end_stage()  # they may be among what was undone
+                self._drop_scene()
+                self._drop_environment()
             raise
 
     def _upload(self, scene: Scene, choice: RenderOptions, timings: Timings) -> SceneBuffers:
@@ -262,19 +304,6 @@ class Renderer:
         )
 
 
-def _point_report(technique: Technique, choice: RenderOptions) -> dict[str, Any]:
-    """What the report says of points: how they were made, how many, and what they took."""
-    if choice.technique != "lfdpr":
-        return {"points": 0, "splat": None}
-    sampling = asdict(choice.sampling)
-    report = {"point_source": sampling.pop("source"), **sampling, "splat": technique.winners}
-    if not choice.effort:
-        return {"points": technique.count_points(), **report}
-    effort = technique.effort()
-    per_pixel = effort.pairs_tried / max(effort.visible_pixels, 1)
-    return {**asdict(effort), "pairs_per_visible_pixel": round(per_pixel, 3), **report}
-
-
 def camera_for(scene: Scene, display: DisplayProfile) -> Camera:
     """The scene's own window, or one that frames it in the display's comfortable depth."""
     if scene.default_camera is not None:
@@ -299,13 +328,15 @@ def _grid(display: DisplayProfile, choice: RenderOptions, views: int) -> ViewGri
     return (ViewGrid.sheared if choice.technique == "mvr" else ViewGrid.lens)(display, rows)
 
 
-def _check_kinds(scene: object, display: object, camera: object) -> None:
+def _check_kinds(scene: object, display: object, camera: object, pose: object = None) -> None:
     """Raise UsageError for what is not an object of the right class, such as a file's name."""
     wanted = {
         "scene": (scene, Scene, "Scene"),
         "display": (display, DisplayProfile, "DisplayProfile"),
         "camera": (camera, Camera | None, "Camera"),
     }
+    if not isinstance(pose, Pose | None):
+        raise UsageError(f"pose: {pose!r}; give a Pose")
     for argument, (value, kind, name) in wanted.items():
         if not isinstance(value, kind):
             raise UsageError(f"{argument}: {value!r}; give a {name}, as {name}.load(…) makes")
@@ -320,20 +351,4 @@ def _check_size(grid: ViewGrid, views: int) -> None:
         raise ResourceError(
             f"views: {views} of {grid.columns}×{grid.rows} are {pixels} pixels, more than "
             f"{MOST_VIEW_PIXELS}; use fewer or smaller views"
-        )
-
-
-def _check_in_front(scene: Scene, camera: Camera, rig: Rig) -> None:
-    """Raise SceneError when nothing of the scene's box lies in front of the eyes."""
-    low, high = scene.bounds()
-    corners = np.array(
-        [[(low, high)[i][0], (low, high)[j][1], (low, high)[k][2], 1.0]
-         for i in (0, 1) for j in (0, 1) for k in (0, 1)]
-    )  # fmt: skip
-    depths = rig.distance_mm - (corners @ camera.display_from_world(rig.panel_mm).T)[:, 2]
-    if depths.max() <= rig.near_mm:
-        raise SceneError(
-            f"scene '{scene.name}': all of it lies behind the viewer; camera target "
-            f"{list(camera.target)} with eye_direction {list(camera.eye_direction)} looks away, "
-            "so turn eye_direction round or move the target"
         )
