@@ -23,7 +23,7 @@ from lfd_render.passes.prefilter import Prefilter
 from lfd_render.passes.view_target import ViewTarget
 from lfd_render.renderer.frames import PanelFrames, Timings
 from lfd_render.renderer.options import MOST_VIEWS, RenderOptions
-from lfd_render.renderer.stage import REPEAT_TURN_RAD, Stage, check_in_front
+from lfd_render.renderer.stage import REPEAT_TURN_RAD, Stage, check_frame, check_in_front
 from lfd_render.scene import Environment, Pose, Scene
 from lfd_render.techniques import Lfdpr, Mvr, Technique
 
@@ -333,13 +333,11 @@ def _check_kinds(scene: object, display: object, camera: object, pose: object = 
     wanted = {
         "scene": (scene, Scene, "Scene"),
         "display": (display, DisplayProfile, "DisplayProfile"),
-        "camera": (camera, Camera | None, "Camera"),
     }
-    if not isinstance(pose, Pose | None):
-        raise UsageError(f"pose: {pose!r}; give a Pose")
     for argument, (value, kind, name) in wanted.items():
         if not isinstance(value, kind):
             raise UsageError(f"{argument}: {value!r}; give a {name}, as {name}.load(…) makes")
+    check_frame(camera, pose)
 
 
 def _check_size(grid: ViewGrid, views: int) -> None:

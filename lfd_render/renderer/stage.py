@@ -81,6 +81,7 @@ class Stage:
     def frame(self, camera: Camera | None = None, pose: Pose | None = None) -> float:
         """Render a frame that stays on the device; its milliseconds. Otherwise as `render`."""
         self._check_open()
+        check_frame(camera, pose)
         with self._call():
             return self.run(camera or self.camera, pose, self.choice)
 
@@ -184,6 +185,14 @@ def _point_report(technique: Technique, choice: RenderOptions) -> dict[str, Any]
     effort = technique.effort()
     per_pixel = effort.pairs_tried / max(effort.visible_pixels, 1)
     return {**asdict(effort), "pairs_per_visible_pixel": round(per_pixel, 3), **report}
+
+
+def check_frame(camera: object, pose: object) -> None:
+    """Raise UsageError for what is not an object of the right class, such as a file's name."""
+    if not isinstance(camera, Camera | None):
+        raise UsageError(f"camera: {camera!r}; give a Camera, as Camera.load(…) makes")
+    if not isinstance(pose, Pose | None):
+        raise UsageError(f"pose: {pose!r}; give a Pose")
 
 
 def check_in_front(scene: Scene, camera: Camera, rig: Rig) -> None:
