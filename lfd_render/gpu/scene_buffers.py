@@ -167,7 +167,7 @@ class SceneBuffers:
         self.warnings = [*scene.warnings, *self.textures.warnings]
         self._records = np.zeros(len(scene.instances), dtype("Draw"))
         self._poser = Poser(scene)
-        self.pose(None)
+        self._stand(None)
         self._records["material"] = [scene.meshes[i.mesh].material for i in scene.instances]
         sided = np.array([m.double_sided for m in scene.materials])
         self._double_sided = sided[self._records["material"]]
@@ -198,7 +198,12 @@ class SceneBuffers:
 
         Raises SceneError if it does not fit.
         """
+        if pose is not self._pose:
+            self._stand(pose)
+
+    def _stand(self, pose: Pose | None) -> None:
         self._posed = self._poser(pose)
+        self._pose = pose
         normal = _cofactors(self._posed.world_from_instance[:, :3, :3])
         for axis, field in enumerate(("x", "y", "z")):
             # Normals are normalised where they are used; only the largest entry must be near 1.

@@ -105,7 +105,7 @@ class Stage:
         return (
             not self.closed
             and self.scene is scene
-            and self.display is display
+            and self.display == display
             and _fixed(self.choice) == _fixed(choice)
         )
 

@@ -66,12 +66,12 @@ class Meshes:
     ) -> tuple[float, ...]:
         """Weights of a mesh's morph targets at rest; none at all stands for zeros."""
         count = mesh.target_count
-        if count and weights and len(weights) != count:
+        if count and any(weights) and len(weights) != count:
             raise SceneError(
                 f"{primitive.path}.targets: {count} targets and {len(weights)} weights; "
                 "give as many weights as targets"
             )
-        return (weights or (0.0,) * count)[:count]
+        return weights if len(weights) == count else (0.0,) * count
 
     def _key(self, primitive: Fields, joints: int) -> tuple[object, ...]:
         """All that decides what a primitive looks like, but for its pose."""

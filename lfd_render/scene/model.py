@@ -378,7 +378,8 @@ class Scene:
         return Poser(self).scene(pose)
 
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Smallest and largest world coordinates at rest, each [3] float64, over all instances."""
+        """Smallest and largest world coordinates at rest, each [3] float64, over all instances but
+        those that are scaled to a line or a point, unless all are."""
         low, high = self._bounds
         return low.copy(), high.copy()
 
@@ -386,7 +387,7 @@ class Scene:
     def _bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         scene = self.posed() if any(self.deforms(i) for i in self.instances) else self
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
-        for instance in scene.instances:
+        for instance in _spread(scene.instances) or scene.instances:
             positions = scene.meshes[instance.mesh].positions
             world_from_local = instance.world_from_local
             for start in range(0, len(positions), _BOUNDS_CHUNK):
@@ -406,3 +407,10 @@ class Scene:
         from lfd_render.scene.loading import load_scene  # noqa: PLC0415 (the loaders import this module)
 
         return load_scene(source, limits or LoadLimits())
+
+
+def _spread(instances: Sequence[Instance]) -> list[Instance]:
+    """Instances that are not scaled to a line or a point."""
+    linear = np.array([i.world_from_local[:3, :3] for i in instances])
+    ranks = np.linalg.matrix_rank(linear).tolist()
+    return [i for i, rank in zip(instances, ranks, strict=True) if rank > 1]
