@@ -43,6 +43,15 @@ class VertexDeform:
         """Entries of the vertex that has the most."""
         return int((self.ranges[:, 1] - self.ranges[:, 0]).max(initial=0))
 
+    def spans(self, first_delta: int, first_influence: int) -> NDArray[np.void]:
+        """DeformSpan [n], where deltas and influences start so far into their buffers."""
+        count, sets = self.weights.shape[:2]
+        spans = np.zeros(count, dtype("DeformSpan"))
+        spans["first_delta"], spans["end_delta"] = (self.ranges + np.uint32(first_delta)).T
+        spans["first_influence"] = first_influence + sets * np.arange(count)
+        spans["end_influence"] = spans["first_influence"] + sets
+        return spans
+
     def of(self, used: NDArray[np.integer]) -> VertexDeform:
         """That of some vertices."""
         first, end = self.ranges[used].astype(np.int64).T
@@ -100,44 +109,31 @@ def _deltas(mesh: Mesh) -> tuple[NDArray[np.uint32], NDArray[np.void]]:
 
 class BatchDeform:
     """The deformed vertices of a batch, after its rigid ones: `first` is the first of them,
-    `first_flat` the first whose normals are the triangles'; `sets` of influences each."""
+    `first_flat` the first whose normals are the triangles'."""
 
     def __init__(
         self, device: Device, parts: Sequence[VertexDeform], first: int, first_flat: int
     ) -> None:
         self.first, self.first_flat = first, first_flat
-        self.sets = max(part.joints.shape[1] for part in parts)
-        starts: dict[int, int] = {}  # entries of a mesh serve all that draw it
-        deltas, ranges, end = [], [], 0
-        for part in parts:
-            if id(part) not in starts:
-                starts[id(part)] = end
-                deltas.append(part.deltas)
-                end += len(part.deltas)
-            ranges.append(part.ranges + np.uint32(starts[id(part)]))
+        distinct = list({id(part): part for part in parts}.values())  # all draws of a mesh share
+        starts, delta, influence = {}, 0, 0
+        for part in distinct:
+            starts[id(part)] = delta, influence
+            delta += len(part.deltas)
+            influence += part.weights.shape[0] * part.weights.shape[1]
+        spans = [part.spans(*starts[id(part)]) for part in parts]
+        joints = [part.joints.reshape(-1, 2) for part in distinct]
+        weights = [part.weights.reshape(-1, _SET) for part in distinct]
         label = "deformation"
-        self._ranges = Buffer.of(device, label, np.concatenate(ranges))
-        self._deltas = Buffer.of(device, label, np.concatenate(deltas))
-        self._joints = Buffer.of(device, label, np.concatenate([self._joints_of(p) for p in parts]))
-        weights = np.concatenate([self._weights_of(p) for p in parts])
-        self._weights = Buffer.of(device, label, weights)
-
-    def _joints_of(self, part: VertexDeform) -> NDArray[np.uint32]:
-        missing = self.sets - part.joints.shape[1]
-        return np.pad(part.joints, ((0, 0), (0, missing), (0, 0)))
-
-    def _weights_of(self, part: VertexDeform) -> NDArray[np.float32]:
-        """What no skin moves follows one joint, its placement."""
-        missing = self.sets - part.weights.shape[1]
-        weights = np.pad(part.weights, ((0, 0), (0, missing), (0, 0)))
-        if self.sets and not part.weights.shape[1]:
-            weights[:, 0, 0] = 1.0
-        return weights
+        self._spans = Buffer.of(device, label, np.concatenate(spans))
+        self._deltas = Buffer.of(device, label, np.concatenate([p.deltas for p in distinct]))
+        self._joints = Buffer.of(device, label, np.concatenate(joints))
+        self._weights = Buffer.of(device, label, np.concatenate(weights))
 
     def buffers(self) -> dict[str, Buffer]:
         """What the deforming kernel reads, by block name."""
         return {
-            "DeltaRanges": self._ranges,
+            "DeformSpans": self._spans,
             "MorphDeltas": self._deltas,
             "InfluenceJoints": self._joints,
             "InfluenceWeights": self._weights,
@@ -145,7 +141,7 @@ class BatchDeform:
 
     def release(self) -> None:
         """Free the buffers."""
-        for buffer in (self._ranges, self._deltas, self._joints, self._weights):
+        for buffer in (self._spans, self._deltas, self._joints, self._weights):
             buffer.release()
 
 

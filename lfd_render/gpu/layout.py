@@ -45,6 +45,13 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("vec4", "row_y"),
         ("vec4", "row_z"),
     ),
+    # What deforms a vertex: its MorphDelta entries and its sets of four influences.
+    "DeformSpan": (
+        ("uint", "first_delta"),
+        ("uint", "end_delta"),
+        ("uint", "first_influence"),
+        ("uint", "end_influence"),
+    ),
     # How far a morph target of weight 1 moves a vertex and its normal.
     "MorphDelta": (
         ("uint", "target"),

@@ -334,6 +334,7 @@ def _batches(scene: Scene, alpha_mode: AlphaMode, *, extras: bool) -> Iterator[l
     triangles = vertices = deltas = 0
     attributes: dict[int, _Attributes] = {}
     deforms: dict[tuple[int, bool], VertexDeform] = {}
+    shared: set[int] = set()  # what deforms parts of the batch already
     for draw, instance in enumerate(scene.instances):
         mesh = scene.meshes[instance.mesh]
         if scene.materials[mesh.material].alpha_mode != alpha_mode:
@@ -346,10 +347,12 @@ def _batches(scene: Scene, alpha_mode: AlphaMode, *, extras: bool) -> Iterator[l
         for part in _split(draw, mesh, attributes[instance.mesh], deforms.get(key)):
             full = triangles + len(part.triangles) > BATCH_TRIANGLES
             full |= vertices + len(part.positions) > BATCH_VERTICES
-            if parts and (full or deltas + _new_deltas(part, parts) > BATCH_DELTAS):
+            if parts and (full or deltas + _new_deltas(part, shared) > BATCH_DELTAS):
                 yield parts
                 parts, triangles, vertices, deltas = [], 0, 0, 0
-            deltas += _new_deltas(part, parts)
+                shared.clear()
+            deltas += _new_deltas(part, shared)
+            shared.add(id(part.deform))
             parts.append(part)
             triangles += len(part.triangles)
             vertices += len(part.positions)
@@ -357,12 +360,10 @@ def _batches(scene: Scene, alpha_mode: AlphaMode, *, extras: bool) -> Iterator[l
         yield parts
 
 
-def _new_deltas(part: _Part, parts: list[_Part]) -> int:
+def _new_deltas(part: _Part, shared: set[int]) -> int:
     """Displacements that a part adds to a batch, whose draws of one mesh share them."""
     deform = part.deform
-    if deform is None or not len(deform.deltas):
-        return 0
-    return 0 if any(deform is other.deform for other in parts) else len(deform.deltas)
+    return 0 if deform is None or id(deform) in shared else len(deform.deltas)
 
 
 def _split(

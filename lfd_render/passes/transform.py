@@ -45,7 +45,6 @@ class Transform:
             {
                 "first": first,
                 "vertices": batch.vertices - first,
-                "sets": batch.deform.sets,
                 "world_from_display_plane": plane,
             },
         )

@@ -1,12 +1,14 @@
 // Vertices of deformed meshes, local or bind space → display space, and their normals → world: morph
 // targets first, then the blend of their joints' matrices (glTF 2.0, sections 3.7.2.2 and 3.7.3.3).
 // A draw that no skin moves has one joint, its placement.
-// In: LocalPositions (xyz, draw index as bits), LocalNormals, Draws, and for each deformed vertex
-// DeltaRanges (its entries of MorphDeltas) and sets of four InfluenceJoints (2 × 16 bits) and weights.
+// In: LocalPositions (xyz, draw index as bits), LocalNormals, Draws, and for each deformed vertex a
+// DeformSpan of MorphDeltas and of sets of four InfluenceJoints (2 × 16 bits each) and InfluenceWeights.
+// The spans bound the loops: Mesa makes uniforms that do constants, and zink's does not see them change.
 // Out: DisplayPositions (xyz, w = 1), WorldNormals; those of flat meshes are transform/flat.comp's.
 
 layout(local_size_x = 128) in;
 
+#include "layout/DeformSpan"
 #include "layout/Draw"
 #include "layout/JointMatrix"
 #include "layout/MorphDelta"
@@ -15,7 +17,7 @@ layout(local_size_x = 128) in;
 layout(std430) readonly restrict buffer LocalPositions { vec4 local_positions[]; };
 layout(std430) readonly restrict buffer LocalNormals { uint local_normals[]; };
 layout(std430) readonly restrict buffer Draws { Draw draws[]; };
-layout(std430) readonly restrict buffer DeltaRanges { uvec2 delta_ranges[]; };
+layout(std430) readonly restrict buffer DeformSpans { DeformSpan deform_spans[]; };
 layout(std430) readonly restrict buffer MorphDeltas { MorphDelta morph_deltas[]; };
 layout(std430) readonly restrict buffer MorphWeights { float morph_weights[]; };
 layout(std430) readonly restrict buffer InfluenceJoints { uvec2 influence_joints[]; };
@@ -26,7 +28,6 @@ layout(std430) writeonly restrict buffer WorldNormals { uint world_normals[]; };
 
 uniform uint first;     // vertex of the batch that deforms
 uniform uint vertices;  // that deform
-uniform uint sets;      // of influences a vertex
 uniform mat4 world_from_display_plane;
 
 JointMatrix plus(JointMatrix sum, uint joint, float weight) {
@@ -36,10 +37,10 @@ JointMatrix plus(JointMatrix sum, uint joint, float weight) {
 }
 
 // What takes a vertex to display space.
-JointMatrix blended(uint deformed, uint first_joint) {
-    if (sets == 0u) return joint_matrices[first_joint];
+JointMatrix blended(uint influence, uint end, uint first_joint) {
+    if (influence == end) return joint_matrices[first_joint];
     JointMatrix sum = JointMatrix(vec4(0.0), vec4(0.0), vec4(0.0));
-    for (uint i = deformed * sets; i < deformed * sets + sets; i++) {
+    for (uint i = influence; i < end; i++) {
         uvec2 joints = influence_joints[i];
         vec4 weights = influence_weights[i];
         sum = plus(sum, first_joint + (joints.x & 0xFFFFu), weights.x);
@@ -68,14 +69,14 @@ void main() {
     vec3 position = local.xyz;
     vec3 normal = direction_from(local_normals[vertex]);
     uint first_weight = draws[draw].first_weight;
-    uvec2 range = delta_ranges[deformed];
-    for (uint i = range.x; i < range.y; i++) {
+    DeformSpan span = deform_spans[deformed];
+    for (uint i = span.first_delta; i < span.end_delta; i++) {
         MorphDelta delta = morph_deltas[i];
         float weight = morph_weights[first_weight + delta.target];
         position += weight * vec3(delta.position_x, delta.position_y, delta.position_z);
         normal += weight * vec3(delta.normal_x, delta.normal_y, delta.normal_z);
     }
-    JointMatrix matrix = blended(deformed, draws[draw].first_joint);
+    JointMatrix matrix = blended(span.first_influence, span.end_influence, draws[draw].first_joint);
     vec4 p = vec4(position, 1.0);
     display_positions[vertex] = vec4(dot(matrix.row_x, p), dot(matrix.row_y, p), dot(matrix.row_z, p), 1.0);
     world_normals[vertex] = word_from((world_from_display_plane * vec4(turned(matrix, normal), 0.0)).xyz);

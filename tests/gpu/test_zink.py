@@ -6,6 +6,7 @@ The device is another than the other tests', so it lives in a process of its own
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -74,3 +75,18 @@ def test_no_window_is_lost_where_uniforms_become_constants(zink: dict[str, str])
     assert report["split"]["windows"][0] > 1
     assert report["visible"] > 1000
     assert report["different"] == 0
+
+
+def test_deformation_of_more_than_one_batch(zink: dict[str, str]) -> None:
+    """What bounds the deforming kernel's loops changes from batch to batch."""
+    file = Path(__file__).with_name("test_deform.py")
+    name = "test_displacements_beyond_a_buffer_go_into_more_batches"
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"{file}::{name}"],
+        env=zink,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+    assert "1 passed" in done.stdout
