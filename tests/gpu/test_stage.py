@@ -74,17 +74,24 @@ def held(device: Device) -> tuple[object, ...]:
 
 @pytest.mark.parametrize(
     "options",
-    [{}, {"splat": "two-pass"}, {"technique": "mvr"}, {"preset": "paper"}],
-    ids=["owned", "two-pass", "mvr", "paper"],
+    [
+        {},
+        {"splat": "two-pass"},
+        {"technique": "mvr"},
+        {"preset": "paper"},
+        {"preset": "paper", "point_source": "raster"},
+    ],
+    ids=["owned", "two-pass", "mvr", "paper", "raster"],
 )
 def test_frames_make_and_compile_nothing(
     device: Device, display: DisplayProfile, camera: Camera, options: dict[str, str]
 ) -> None:
     with Renderer(device) as renderer, renderer.stage(reed(), display, camera, **options) as stage:
-        stage.frame(pose=reed_pose(1.6))  # the widest swing: the frames after need no more room
+        for time in (0.8, 1.6):  # the widest and the highest: frames after need no more room
+            stage.frame(pose=reed_pose(time))
         before = held(device)
         with counting(device) as made:
-            for time in np.linspace(1.5, 0.1, 8):
+            for time in np.linspace(1.5, 0.1, 6):
                 stage.frame(camera.turned(0.02 * time), reed_pose(time))
             stage.read()
         assert not made
