@@ -29,6 +29,7 @@ from lfd_render.gpu.memory import Buffer, TextureArray
 from lfd_render.gpu.textures import MaterialTextures
 from lfd_render.scene import Material, Mesh, Pose, Poser, Scene
 from lfd_render.scene.model import ALPHA_MODES, AlphaMode
+from lfd_render.scene.nodes import handedness
 
 if TYPE_CHECKING:
     from lfd_render.gpu.device import Device
@@ -172,7 +173,8 @@ class SceneBuffers:
         sided = np.array([m.double_sided for m in scene.materials])
         self._double_sided = sided[self._records["material"]]
         self.deformation: Deformation | None = None
-        if any(scene.deforms(instance) for instance in scene.instances):
+        self._deforms = np.array([scene.deforms(instance) for instance in scene.instances])
+        if self._deforms.any():
             self.deformation = Deformation(device, scene, self._poser)
             self._records["first_joint"] = self.deformation.first_joint
             self._records["first_weight"] = self.deformation.first_weight
@@ -215,6 +217,8 @@ class SceneBuffers:
         """Write the draws for a camera, in the pose. display_from_world: float64 [4, 4]."""
         with np.errstate(over="ignore", invalid="ignore"):
             matrices = display_from_world @ self._posed.world_from_instance
+            mirrored = (handedness(matrices) < 0.0) != self._posed.mirrored
+            matrices[self._deforms] = np.eye(4)  # they go by joints, and may be beyond float32
             words = matrices.transpose(0, 2, 1).reshape(-1, 16).astype(np.float32)
         if not np.isfinite(words).all():
             name = self.scene.instances[int(np.argmin(np.isfinite(words).all(axis=1)))].name
@@ -223,7 +227,6 @@ class SceneBuffers:
                 "beside the camera's window for single precision; scale it or move the camera"
             )
         self._records["display_from_local"] = words
-        mirrored = (np.linalg.det(matrices[:, :3, :3]) < 0.0) != self._posed.mirrored
         self._records["facing"] = np.where(mirrored, CONSTANTS["FACING_MIRRORED"], 0) | np.where(
             self._double_sided, CONSTANTS["FACING_BOTH"], 0
         )

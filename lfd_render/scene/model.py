@@ -385,11 +385,16 @@ class Scene:
 
     @cached_property
     def _bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        scene = self.posed() if any(self.deforms(i) for i in self.instances) else self
+        from lfd_render.scene.pose import Poser  # noqa: PLC0415 (it imports this module)
+
+        poser = Poser(self)
+        posed = poser()
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
-        for instance in _spread(scene.instances) or scene.instances:
-            positions = scene.meshes[instance.mesh].positions
-            world_from_local = instance.world_from_local
+        for index in _spread(posed.world_from_instance):
+            instance, world_from_local = self.instances[index], posed.world_from_instance[index]
+            positions: NDArray[np.floating] = self.meshes[instance.mesh].positions
+            if self.deforms(instance):
+                positions, _ = poser.vertices(index, posed)
             for start in range(0, len(positions), _BOUNDS_CHUNK):
                 chunk = positions[start : start + _BOUNDS_CHUNK].astype(np.float64)
                 p_world = chunk @ world_from_local[:3, :3].T + world_from_local[:3, 3]
@@ -409,8 +414,9 @@ class Scene:
         return load_scene(source, limits or LoadLimits())
 
 
-def _spread(instances: Sequence[Instance]) -> list[Instance]:
-    """Instances that are not scaled to a line or a point."""
-    linear = np.array([i.world_from_local[:3, :3] for i in instances])
-    ranks = np.linalg.matrix_rank(linear).tolist()
-    return [i for i, rank in zip(instances, ranks, strict=True) if rank > 1]
+def _spread(world_from_instance: NDArray[np.float64]) -> list[int]:
+    """Instances that are not scaled to a line or a point; all, if there is no other."""
+    spread: list[int] = np.flatnonzero(
+        np.linalg.matrix_rank(world_from_instance[:, :3, :3]) > 1
+    ).tolist()
+    return spread or list(range(len(world_from_instance)))

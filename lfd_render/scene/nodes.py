@@ -121,3 +121,11 @@ def node_transform(
     matrix[:3, :3] = turn * np.array(scale, np.float64)
     matrix[:3, 3] = translation
     return matrix
+
+
+def handedness(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of placements [n, 4, 4]: −1 where one mirrors, 0 where it flattens, else 1."""
+    linear = matrices[:, :3, :3]
+    # Scaled first, so that determinants neither overflow nor vanish.
+    scale = np.maximum(np.abs(linear).max(axis=(1, 2), keepdims=True), 1e-300)
+    return np.asarray(np.sign(np.linalg.det(linear / scale)))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lfd_render.errors import SceneError
 from lfd_render.scene.deform import deformed
 from lfd_render.scene.model import Instance, Mesh, Scene
+from lfd_render.scene.nodes import handedness
 
 Float64 = NDArray[np.float64]
 Node = int | str
@@ -124,6 +125,12 @@ class Poser:
             )
         with np.errstate(over="ignore", invalid="ignore"):
             world_from_bind = world[self._joints] @ self._joint_from_bind
+        bad = np.flatnonzero(~np.isfinite(world_from_bind).all(axis=(1, 2)))
+        if len(bad):
+            raise SceneError(
+                f"pose: node {self._joints[bad[0]]} '{scene.nodes.names[self._joints[bad[0]]]}': "
+                "what it moves as a joint overflows; scale it, or its inverse bind matrix, down"
+            )
         return Posed(
             world_from_instance=self._instances(world),
             mirrored=self._mirrored(world_from_bind),
@@ -216,8 +223,7 @@ class Poser:
 
     def _mirrored(self, world_from_bind: Float64) -> NDArray[np.bool_]:
         mirrored = np.zeros(len(self._scene.instances), bool)
-        with np.errstate(over="ignore", invalid="ignore"):
-            sign = np.sign(np.linalg.det(world_from_bind[:, :3, :3]))
+        sign = handedness(world_from_bind)
         for index in self._skinned:
             influences = self._scene.meshes[self._scene.instances[index].mesh].influences
             assert influences is not None

@@ -335,6 +335,26 @@ def test_draws_of_a_mesh_share_what_deforms_it(device: Device) -> None:
     assert sizes[0]["MorphDeltas"] == 28 * 8  # of the vertices above the middle, 28 bytes each
 
 
+def test_moving_scenes_of_any_scale_look_the_same(device: Device) -> None:
+    """Joints are composed in double precision, so only what is left is rounded."""
+    scene = dataclasses.replace(reed(), lights=())
+    display = DisplayProfile.load(PAPER)
+    pictures = []
+    with Renderer(device) as renderer:
+        for scale in (1.0, 2.0**-500, 2.0**500):
+            size = np.diag([scale, scale, scale, 1.0])
+            local = np.array(scene.nodes.parent_from_node)
+            local[scene.nodes.parents < 0] = size @ local[scene.nodes.parents < 0]
+            nodes = dataclasses.replace(scene.nodes, parent_from_node=local)
+            leaf = dataclasses.replace(scene.instances[1], world_from_local=nodes.world()[2])
+            sized = dataclasses.replace(scene, nodes=nodes, instances=(scene.instances[0], leaf))
+            pose = Pose({"tip": turn(2, 0.4, translation=(0.0, 2.0, 0.0))})
+            pictures.append(renderer.views(sized, display, pose=pose, **SMALL))
+    assert pictures[0].std() > 20
+    for other in pictures[1:]:
+        np.testing.assert_array_equal(other, pictures[0])
+
+
 def test_a_pose_too_far_for_single_precision_is_told(device: Device) -> None:
     scene = reed()
     far = Pose({"tip": np.array([[1, 0, 0, 1e300], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])})

@@ -201,6 +201,27 @@ def test_a_pose_that_overflows() -> None:
         arm().posed(Pose({0: huge, 1: huge}))
 
 
+def test_joints_that_overflow() -> None:
+    """The planted node is finite, and so is the inverse bind matrix."""
+    scene = deforming(Influences.scaled(np.array([[0, 1, 0, 0]] * 3), np.ones((3, 4))))
+    bind = np.stack([np.eye(4), node_transform(scale=(1e200, 1, 1))])
+    scene = replace(scene, skins=(Skin("skin", np.array([0, 1]), bind),))
+    with pytest.raises(SceneError, match="pose: node 1 'b': what it moves as a joint overflows"):
+        scene.posed(Pose({"b": node_transform(scale=(1e200, 1, 1))}))
+
+
+@pytest.mark.parametrize("scale", [1e-160, 1e-6, 1.0, 1e6, 1e160])
+def test_tiny_and_huge_skins_are_bounded_and_mirrored(scale: float) -> None:
+    scene = deforming(Influences.scaled(np.array([[0, 1, 0, 0]] * 3), np.ones((3, 4))))
+    for sign in (1.0, -1.0):
+        local = np.tile(node_transform(scale=(sign * scale, scale, scale)), (2, 1, 1))
+        nodes = replace(scene.nodes, parent_from_node=local)
+        placed = replace(scene, nodes=nodes)
+        low, high = placed.bounds()
+        np.testing.assert_allclose(np.abs(high - low) / scale, [1, 1, 0], rtol=1e-6)
+        assert list(Poser(placed)().mirrored) == [sign < 0.0]
+
+
 def test_a_name_of_two_nodes_is_no_name() -> None:
     scene = arm()
     twins = replace(scene, nodes=replace(scene.nodes, names=("a", "a")))
@@ -276,6 +297,23 @@ def test_all_sets_of_influences_count(gltf: GltfBuilder, sets: int) -> None:
     moved = posed_mesh(scene, Pose({"second": node_transform((0, 0, 7))}))
     np.testing.assert_array_equal(moved.positions[:, 2], 7.0)
     assert moved.name == scene.meshes[0].name
+
+
+def test_nodes_share_a_mesh_whatever_moves_it(gltf: GltfBuilder) -> None:
+    """Two skins of as many joints and other weights need no mesh of their own."""
+    primitive = skinned(gltf, 1)
+    primitive["targets"] = [{"POSITION": gltf.accessor(TRIANGLE)}]
+    mesh = gltf.mesh(primitive)
+    joints = [gltf.node(translation=[0, 0, z]) for z in range(4)]
+    for number in (0, 1):
+        gltf.append("skins", {"joints": joints[2 * number : 2 * number + 2]})
+        gltf.node(mesh=mesh, skin=number, weights=[number])
+    scene = Scene.load(gltf.write())
+    assert len(scene.meshes) == 1
+    still = scene.posed()
+    for instance, offset, scale in zip(still.instances, (1, 3), (1, 2), strict=True):
+        found = still.meshes[instance.mesh].positions
+        np.testing.assert_array_equal(found, scale * TRIANGLE + np.float32([0, 0, offset]))
 
 
 def test_morph_targets_keep_normals_and_unshared_vertices(gltf: GltfBuilder) -> None:
