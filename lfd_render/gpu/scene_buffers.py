@@ -230,9 +230,9 @@ class SceneBuffers:
         self._records["facing"] = np.where(mirrored, CONSTANTS["FACING_MIRRORED"], 0) | np.where(
             self._double_sided, CONSTANTS["FACING_BOTH"], 0
         )
-        self.draws.write(self._records)
         if self.deformation:
             self.deformation.place(display_from_world, self._posed)
+        self.draws.write(self._records)
         self.lighting.place(display_from_world)
         # How planes go the other way: n_world = Mᵗ·n_display for M = display_from_world.
         linear = display_from_world[:3, :3]

@@ -53,7 +53,7 @@ class Stage:
     ) -> None:
         """call: what surrounds each use of the device. The stage owns `frames`, not `buffers`."""
         self.scene, self.display, self.choice = scene, display, choice
-        self.camera = camera
+        self.camera = self._last_camera = camera
         self.closed = False
         self._device = device
         self._buffers = buffers
@@ -114,11 +114,12 @@ class Stage:
         rig = self._rig
         if pose is None:
             check_in_front(self.scene, camera, rig)
-        self._last_camera = camera
         self._buffers.pose(pose)
         placement = Placement(camera.display_from_world(rig.panel_mm), choice.background)
-        self._timings.frames.append(self._frames.run(placement, choice.exposure))
-        return self._timings.frames[-1][0]
+        frame = self._frames.run(placement, choice.exposure)
+        self._timings.frames.append(frame)
+        self._last_camera = camera
+        return frame[0]
 
     def result(self, choice: RenderOptions) -> Eia:
         """The last frame's image and report, inside a call of the renderer."""

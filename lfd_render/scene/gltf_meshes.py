@@ -102,9 +102,9 @@ class Meshes:
             return None
         triangles = vertices.keep_used(triangles)
         moving = _TARGET_BYTES * vertices.target_count + (_INFLUENCE_BYTES * 4 if joints else 0)
+        count = vertices.count if vertices.has("NORMAL") else 3 * len(triangles)
         self._document.budget.take(
-            "mesh_bytes",
-            (_VERTEX_BYTES + moving) * vertices.count + _TRIANGLE_BYTES * len(triangles),
+            "mesh_bytes", (_VERTEX_BYTES + moving) * count + _TRIANGLE_BYTES * len(triangles)
         )
         material = self._materials.place(primitive.index("material", len(self._document.materials)))
         self.meshes.append(self._mesh(name, vertices, triangles, joints, material))

@@ -152,7 +152,10 @@ class Poser:
             instances.append(Instance(instance.name, mesh, posed.world_from_instance[index]))
         return replace(
             scene,
-            meshes=tuple(replace(m, morph=None, influences=None) for m in meshes),
+            meshes=tuple(
+                replace(m, morph=None, influences=None) if m.morph or m.influences else m
+                for m in meshes
+            ),
             instances=tuple(instances),
             lights=tuple(
                 replace(light, world_from_light=matrix, node=None)
@@ -196,14 +199,13 @@ class Poser:
 
     def _transforms(self, pose: Pose) -> Float64:
         local = self._scene.nodes.parent_from_node.copy()
-        for node, matrix in pose.transforms.items():
-            local[self._node(node)] = matrix
+        for node, (_, matrix) in self._by_node("transform", pose.transforms).items():
+            local[node] = matrix
         return local
 
     def _posed_weights(self, pose: Pose) -> Float64:
         weights = self._weights.copy()
-        for key, row in pose.weights.items():
-            node = self._node(key)
+        for node, (key, row) in self._by_node("weights", pose.weights).items():
             instances = self._weighted.get(node, [])
             if not instances:
                 raise SceneError(
@@ -230,6 +232,19 @@ class Poser:
             first, shares = self.first_joint[index], influences.joint_shares
             mirrored[index] = float(shares @ sign[first : first + len(shares)]) < 0.0
         return mirrored
+
+    def _by_node(self, what: str, given: Mapping[Node, Any]) -> dict[int, tuple[Node, Any]]:
+        """What is given for each node, with the key that it is given by."""
+        by_node: dict[int, tuple[Node, Any]] = {}
+        for key, value in given.items():
+            node = self._node(key)
+            if node in by_node:
+                raise SceneError(
+                    f"pose: {what} of node {key!r}: given as node {by_node[node][0]!r} too; "
+                    "give it once"
+                )
+            by_node[node] = key, value
+        return by_node
 
     def _node(self, key: Node) -> int:
         """The index of a node, given that or its name."""

@@ -184,6 +184,7 @@ def test_weights_are_scaled_to_a_sum_of_one() -> None:
         (lambda: Pose({0: np.ones((4, 4))}), "whose last row is 0 0 0 1"),
         (lambda: Pose({0: np.full((4, 4), np.nan)}), "give finite numbers"),
         (lambda: Pose({0: "turn"}), "pose: transform of node 0: 'turn'; give finite numbers"),
+        (lambda: Pose({"a": np.eye(4), 0: np.eye(4)}), "node 0: given as node 'a' too; give it o"),
         (lambda: Pose([np.eye(4)]), "pose: transforms: list; give a dict by node"),
         (lambda: Pose(weights={0: 3.0}), "pose: weights of node 0: 3.0; give one number a target"),
         (lambda: Pose(weights={0: (1.0,)}), "pose: weights of node 0: 1 of them; its mesh has 2"),
