@@ -201,14 +201,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             for name in names:
                 scene = load(name)
                 results = measure(renderer, scene, display, study)
+                device_name = renderer.device.name
                 if as_json:
                     rows = [dataclasses.asdict(result) for result in results]
-                    print(json.dumps({"scene": scene.name, "device": renderer.device.name,
-                                      "triangles": scene.triangle_count, **dataclasses.asdict(study),
-                                      "variants": rows}), flush=True)  # fmt: skip
+                    head = {"scene": scene.name, "triangles": scene.triangle_count}
+                    found = {"device": device_name, **dataclasses.asdict(study), "variants": rows}
+                    print(json.dumps(head | found), flush=True)
                 else:
-                    print(f"{scene.name}, {scene.triangle_count:,} triangles, "
-                          f"{renderer.device.name}\n\n{table(results)}\n", flush=True)  # fmt: skip
+                    print(f"{scene.name}, {scene.triangle_count:,} triangles, {device_name}\n")
+                    print(f"{table(results)}\n", flush=True)
     except LfdError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

@@ -11,8 +11,8 @@
 layout(std430) readonly restrict buffer Eyes { float eyes[]; };  // in columns, view 0 first
 
 void splat_row(PointRow points, bool real, int view, float eye) {
-    if (!real || view >= frame.views) return;
     Interval seen = interval_of(points, eye);
+    if (!real || view >= frame.views) seen.end = seen.column;
     if (seen.faced) tried(uint(max(seen.end - seen.column, 1)));
     splat_interval(points, seen, view, eye);
 }
