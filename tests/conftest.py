@@ -116,6 +116,12 @@ def zink() -> dict[str, str]:
 
 
 @pytest.fixture(scope="session")
+def assets_if_any() -> Path:
+    """Where the real models would be, for tests that have a substitute for each."""
+    return ASSETS
+
+
+@pytest.fixture(scope="session")
 def assets() -> Path:
     """The folder of real models beside the checkout."""
     if not ASSETS.is_dir():
