@@ -3,10 +3,8 @@
     python -m lfd_render.bench.lod [--json] [--pictures FOLDER]
 
 A corridor of fine textures, stretched, turned, and seen at grazing angles, is rendered into many
-views by LFDPR and each rule. The standard (GStd in Gavane and Watson 2024) is MVR from the view's
-own eye with SAMPLES × SAMPLES samples a pixel, their mean taken in linear light. Its samples are
-themselves filtered, by `anisotropic` or the rule asked for: as their footprints are SAMPLES times
-as small each way, that changes little.
+views by LFDPR and each rule, and compared with the standard (`bench.gold`) of SAMPLES × SAMPLES
+samples a pixel.
 """
 
 from __future__ import annotations
@@ -23,13 +21,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lfd_render.bench.gold import alone, chosen_views, gold_standard, write_views
 from lfd_render.display import Camera, DisplayProfile
 from lfd_render.errors import LfdError
 from lfd_render.gpu.layout import LOD_RULES
-from lfd_render.panel.picture import write_png
 from lfd_render.quality import rmse, ssim_luma
-from lfd_render.reference.encode import srgb_from_linear
-from lfd_render.reference.textures import linear_from_srgb
 from lfd_render.renderer import Renderer
 from lfd_render.scene import Image, Instance, Material, Scene, TextureSlot
 from lfd_render.scene.procedural.grid import Surface, tessellate
@@ -39,7 +35,6 @@ from lfd_render.scene.procedural.textures import to_pixels
 
 Pixels = NDArray[np.uint8]
 DISPLAY = "gavane-2024-tilted-4k"
-_LINEAR_OF_CODE = linear_from_srgb(np.arange(256) / 255.0)
 _INK, _PAPER = 0.1, 0.88  # sRGB; paper is 0.75 in linear light, below the tone curve's shoulder
 
 
@@ -143,31 +138,6 @@ def _lettered(width: int, height: int) -> Pixels:
     return _painted(ink)
 
 
-def gold_standard(
-    renderer: Renderer, scene: Scene, display: DisplayProfile, study: Study, view: int
-) -> Pixels:
-    """One view's picture, uint8 [y, x, 3], each pixel the mean of its samples in linear light."""
-    rig = display.rig(study.views)
-    alone = dataclasses.replace(rig, eye_x_mm=rig.eye_x_mm[view : view + 1])
-    n = study.samples
-    width, height = study.view_size
-    fine = renderer.views(
-        scene,
-        display,
-        _camera(display),
-        rig=alone,
-        view_size=(n * width, n * height),
-        technique="mvr",
-        lod=study.standard_lod,
-    )[0]
-    strips = (
-        _LINEAR_OF_CODE[fine[n * y : n * y + n]].reshape(n, width, n, 3).mean(axis=(0, 2))
-        for y in range(height)
-    )
-    linear = np.stack(list(strips))
-    return np.rint(255.0 * srgb_from_linear(linear)).astype(np.uint8)
-
-
 def _camera(display: DisplayProfile) -> Camera:
     """The window in its own millimetres."""
     return Camera((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), display.size_mm[1])
@@ -182,8 +152,14 @@ def measure(
     """
     scene, camera = corridor(*display.size_mm), _camera(display)
     rig = display.rig(study.views)
-    chosen = np.unique(np.linspace(0, rig.views - 1, study.compared).round().astype(int)).tolist()
-    standard = {v: gold_standard(renderer, scene, display, study, v) for v in chosen}
+    chosen = chosen_views(rig.views, study.compared)
+    standard = [
+        gold_standard(
+            renderer, scene, display, camera, eye=alone(rig, view), view_size=study.view_size,
+            samples=study.samples, lod=study.standard_lod,
+        )
+        for view in chosen
+    ]  # fmt: skip
     found = {
         rule: renderer.views(scene, display, camera, rig=rig, view_size=study.view_size, lod=rule)[
             chosen
@@ -191,11 +167,11 @@ def measure(
         for rule in LOD_RULES
     }
     if pictures is not None:
-        _write(pictures, chosen, {"standard": np.stack(list(standard.values())), **found})
+        write_views(pictures, chosen, {"standard": np.stack(standard), **found})
     times = _times(renderer, scene, display, study)
     results = []
     for rule in LOD_RULES:
-        pairs = list(zip(found[rule], standard.values(), strict=True))
+        pairs = list(zip(found[rule], standard, strict=True))
         error = statistics.fmean(rmse(a, b) for a, b in pairs)
         likeness = statistics.fmean(ssim_luma(a, b) for a, b in pairs)
         results.append(Result(rule, error, likeness, *times[rule]))
@@ -221,13 +197,6 @@ def _times(
             ).report["timings_ms"]
             times[rule].append((timings["frame"], timings["shade"]))
     return {rule: min(rounds) for rule, rounds in times.items()}
-
-
-def _write(folder: Path, views: Sequence[int], pictures: dict[str, Pixels]) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, stack in pictures.items():
-        for view, pixels in zip(views, stack, strict=True):
-            write_png(folder / f"{name}_{view:03d}.png", pixels)
 
 
 def table(results: Sequence[Result]) -> str:
