@@ -31,6 +31,7 @@ Bool = NDArray[np.bool_]
 
 SMALLEST_ALPHA = 0.002  # GGX α of the smoothest surface, which keeps its highlight finite
 LEAST_ALPHA = 1 / 255  # of blended texels that show
+LEAST_SINE = 2e-6  # between changes of texture coordinates that are not one line
 SRGB_ROLES = ("base_color_texture", "emissive_texture")
 
 
@@ -236,9 +237,12 @@ class Surface:
         corners = self._shading.triangles.texcoords[points.ids][:, :, slot.texcoord]
         matrix = np.eye(3) if slot.uv_transform is None else slot.uv_transform
         corners = corners @ matrix[:2, :2].T + matrix[:2, 2]
-        uv, uv_dx, uv_dy = (
-            np.einsum("nc,ncu->nu", weights, corners)
-            for weights in (points.weights, points.weights_dx, points.weights_dy)
+        uv = np.einsum("nc,ncu->nu", points.weights, corners)
+        # What is the same at all corners stands still, exactly.
+        sides = corners[:, 1:] - corners[:, :1]
+        uv_dx, uv_dy = (
+            np.einsum("nc,ncu->nu", weights[:, 1:], sides)
+            for weights in (points.weights_dx, points.weights_dy)
         )
         return uv, uv_dx, uv_dy
 
@@ -263,7 +267,7 @@ class Surface:
 
         The direction of u on the surface comes from the gradients of position and texture
         coordinate, made square to the normal; the third direction is square to both, on the side
-        against v. Where texture coordinates stand still there are none.
+        against v. Where texture coordinates stand still or move along a line there are none.
         """
         slot, texels = self._material.normal_texture, self.texture("normal_texture")
         if slot is None or texels is None:
@@ -286,7 +290,9 @@ class Surface:
             + map_normal[:, 1:2] * bitangent
             + map_normal[:, 2:] * normal
         )
-        without = (np.sum(tangent**2, axis=1) == 0.0) | (np.sum(bitangent**2, axis=1) == 0.0)
+        lengths = np.linalg.norm(uv_dx, axis=1) * np.linalg.norm(uv_dy, axis=1)
+        without = np.abs(determinant) <= LEAST_SINE * lengths
+        without |= (np.sum(tangent**2, axis=1) == 0.0) | (np.sum(bitangent**2, axis=1) == 0.0)
         return np.where(without[:, None], normal, turned)
 
     @cached_property

@@ -8,6 +8,7 @@
 const float PI = 3.14159265359;
 const vec3 MOST_RADIANCE = vec3(65504.0);  // what half floats hold
 const float SMALLEST_ALPHA = 0.002;  // keeps the specular peak of a mirror finite
+const float LEAST_SINE = 2e-6;  // between changes of texture coordinates that are not one line: 32 roundings
 
 struct Surface {
     vec3 to_eye;       // world, any length; not two positions, which lose precision far from 0
@@ -24,10 +25,11 @@ struct Surface {
 
 // Tangent frame from the gradients of position and texture coordinate, so that files without tangents
 // and files with them shade alike. It is square, as glTF's is, also where texture coordinates are skewed. +Y
-// of the map is up in the picture, against v.
+// of the map is up in the picture, against v. Coordinates without area have no frame: the map is left out.
 vec3 mapped_normal(vec3 normal, Surface surface, uint slot) {
     Footprint f = slot_footprint(surface.material, NORMAL, surface.uv0, surface.uv1);
     float determinant = f.dx.x * f.dy.y - f.dx.y * f.dy.x;
+    if (abs(determinant) <= LEAST_SINE * length(f.dx) * length(f.dy)) return normal;
     vec3 along_u = (surface.dp_dx * f.dy.y - surface.dp_dy * f.dx.y) * sign(determinant);
     vec3 along_v = (surface.dp_dy * f.dx.x - surface.dp_dx * f.dy.x) * sign(determinant);
     vec3 tangent = along_u - normal * dot(normal, along_u);

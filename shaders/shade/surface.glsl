@@ -40,6 +40,11 @@ Visible visible_pixel() {
     return seen;
 }
 
+// By differences of the corners', so that what is the same at all three stands still.
+vec2 change(mat3x2 uv, vec3 weights_change) {
+    return (uv[1] - uv[0]) * weights_change.y + (uv[2] - uv[0]) * weights_change.z;
+}
+
 Surface surface_at(uint triangle, int view, int row, int column) {
     uvec4 corners = triangles[triangle];
     vec3 a = display_positions[corners.x].xyz;
@@ -59,8 +64,8 @@ Surface surface_at(uint triangle, int view, int row, int column) {
     surface.normal = mat3(vertex_normal(corners.x), vertex_normal(corners.y), vertex_normal(corners.z)) * hit.weights;
     surface.dp_dx = mat3(turn_from_display) * hit.dp_dx;
     surface.dp_dy = mat3(turn_from_display) * hit.dp_dy;
-    surface.uv0 = Footprint(uv0 * hit.weights, uv0 * hit.weights_dx, uv0 * hit.weights_dy, views);
-    surface.uv1 = Footprint(uv1 * hit.weights, uv1 * hit.weights_dx, uv1 * hit.weights_dy, views);
+    surface.uv0 = Footprint(uv0 * hit.weights, change(uv0, hit.weights_dx), change(uv0, hit.weights_dy), views);
+    surface.uv1 = Footprint(uv1 * hit.weights, change(uv1, hit.weights_dx), change(uv1, hit.weights_dy), views);
     surface.color = mat3x4(vertex_color(corners.x), vertex_color(corners.y), vertex_color(corners.z)) * hit.weights;
     surface.material = draws[corners.w].material;
     surface.back = (eye_side(plane, eye_mm) < 0.0) != ((facing & FACING_MIRRORED) != 0u);

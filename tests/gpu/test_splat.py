@@ -60,7 +60,8 @@ class Case:
     ) -> tuple[int, int]:
         """Pixels, solid and blended, that differ from the reference, and for no good reason."""
         triangles, grid = triangles or self.triangles, grid or self.grid
-        shading = Shading(self.shading.scene, triangles, self.shading.world_from_display)
+        old = self.shading
+        shading = Shading(old.scene, triangles, old.world_from_display, lod=old.lod)
         rig, found = self.rig, self.winners
         accepts = opaque_at(shading, rig, grid)
         solid = visible(triangles, rig, grid, accepts)
