@@ -24,6 +24,7 @@ from lfd_render.reference.raster import Accepts, Pixels, Rays, faces, meet, rays
 from lfd_render.reference.textures import Footprints, among_views, filtered, mip_chain
 from lfd_render.reference.transform import Triangles, points_by, unit
 from lfd_render.scene import Material, Scene
+from lfd_render.scene.findings import UV_ROUNDING
 
 Float64 = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -207,6 +208,18 @@ class Shading:
         return self._chains[image, srgb]
 
 
+def texcoord_sides(corners: Float64) -> Float64:
+    """From the first corner to the others, [pixel, 2, uv], of texture coordinates [pixel, corner,
+    uv]: along one line where they have no area but for rounding."""
+    sides: Float64 = corners[:, 1:] - corners[:, :1]
+    lengths = np.linalg.norm(sides, axis=-1)
+    lost = UV_ROUNDING * np.abs(corners).max(axis=(1, 2)) * lengths.sum(axis=-1)
+    flat = np.abs(np.linalg.det(sides)) <= lost
+    longer = sides[np.arange(len(sides)), lengths.argmax(axis=-1)]
+    along = unit(longer)[:, None]
+    return np.where(flat[:, None, None], _dot(sides, along)[..., None] * along, sides)
+
+
 class Surface:
     """Points on one material."""
 
@@ -236,10 +249,8 @@ class Surface:
         points = self._points
         corners = self._shading.triangles.texcoords[points.ids][:, :, slot.texcoord]
         matrix = np.eye(3) if slot.uv_transform is None else slot.uv_transform
-        corners = corners @ matrix[:2, :2].T + matrix[:2, 2]
-        uv = np.einsum("nc,ncu->nu", points.weights, corners)
-        # What is the same at all corners stands still, exactly.
-        sides = corners[:, 1:] - corners[:, :1]
+        uv = np.einsum("nc,ncu->nu", points.weights, corners @ matrix[:2, :2].T + matrix[:2, 2])
+        sides = texcoord_sides(corners) @ matrix[:2, :2].T
         uv_dx, uv_dy = (
             np.einsum("nc,ncu->nu", weights[:, 1:], sides)
             for weights in (points.weights_dx, points.weights_dy)
@@ -351,7 +362,8 @@ class Surface:
         reflected = 2.0 * _dot(normal, toward_eye)[:, None] * normal - toward_eye
         scale, bias = environment_brdf(roughness, n_dot_v)
         light = self._shading.environment.radiance(reflected, roughness)
-        return (f0 * scale[:, None] + bias[:, None]) * light
+        # The polynomial dips below zero for black metals.
+        return np.maximum(f0 * scale[:, None] + bias[:, None], 0.0) * light
 
     def _lit(
         self,

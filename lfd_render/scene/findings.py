@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lfd_render.scene.model import Mesh, Scene
 
+UV_ROUNDING = 5e-7  # of texture coordinates, relative: what a file's own arithmetic leaves
 _CHUNK = 1 << 18  # triangles looked at together: 40 MB
 
 
@@ -56,5 +57,8 @@ def _areas(
         if texcoord is not None:
             a, b, c = mesh.texcoords[triangles, texcoord].astype(np.float64).transpose(1, 2, 0)
             (us, ut), (vs, vt) = b - a, c - a
-            uv_area = us * vt != ut * vs
+            # As shading has it (`reference.shade.texcoord_sides`).
+            largest = np.abs(mesh.texcoords[triangles, texcoord]).max(axis=(1, 2))
+            lost = UV_ROUNDING * largest * (np.hypot(us, ut) + np.hypot(vs, vt))
+            uv_area = np.abs(us * vt - ut * vs) > lost
         yield area, uv_area

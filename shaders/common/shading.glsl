@@ -131,7 +131,7 @@ vec4 shade(Surface surface) {
 
     vec2 brdf = environment_brdf(roughness, facet.n_dot_v);
     vec3 radiance = orm.r * (facet.albedo * environment_diffuse(normal)
-        + (facet.f0 * brdf.x + brdf.y) * environment_radiance(reflect(-facet.view, normal), roughness));
+        + max(facet.f0 * brdf.x + brdf.y, 0.0) * environment_radiance(reflect(-facet.view, normal), roughness));
     if (LIGHTS == 0 && ENVIRONMENT == STUDIO) {
         vec3 to_key = turned(KEY_DIRECTION, environment.turn.y);
         float n_dot_l = dot(normal, to_key);

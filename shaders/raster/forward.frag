@@ -15,6 +15,21 @@ uniform float eye_mm;
 
 layout(location = 0) out vec4 radiance;
 
+const float ROUNDING = 5e-7;  // of interpolated coordinates, relative
+
+// Changes that are along one line but for rounding are made so.
+Footprint footprint(vec2 uv) {
+    vec2 dx = dFdx(uv), dy = dFdy(uv);
+    float lost = ROUNDING * max(abs(uv.x), abs(uv.y));
+    if (abs(dx.x * dy.y - dx.y * dy.x) <= lost * (length(dx) + length(dy))) {
+        vec2 longer = dot(dx, dx) > dot(dy, dy) ? dx : dy;
+        vec2 along = longer * inversesqrt(max(1e-30, dot(longer, longer)));
+        dx = along * dot(along, dx);
+        dy = along * dot(along, dy);
+    }
+    return Footprint(uv, dx, dy, ONE_VIEW);
+}
+
 void main() {
     Surface surface;
     mat3 turn = mat3(turn_from_display);
@@ -23,8 +38,8 @@ void main() {
     surface.normal = normal_world;
     surface.dp_dx = turn * dFdx(p_display);
     surface.dp_dy = turn * dFdy(p_display);
-    surface.uv0 = Footprint(uv01.xy, dFdx(uv01.xy), dFdy(uv01.xy), ONE_VIEW);
-    surface.uv1 = Footprint(uv01.zw, dFdx(uv01.zw), dFdy(uv01.zw), ONE_VIEW);
+    surface.uv0 = footprint(uv01.xy);
+    surface.uv1 = footprint(uv01.zw);
     surface.color = color;
     surface.material = material;
     surface.back = !gl_FrontFacing;

