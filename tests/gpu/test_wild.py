@@ -153,7 +153,7 @@ def pixels_shown(case: Wild) -> int:
 
 def test_wrong_passes_are_caught(device: Device) -> None:
     """Planted faults: another rule, a light's scene without it, triangles of other materials."""
-    cases = [rendered(device, seed, 3, "owned", "area") for seed in (1, 3)]
+    cases = [rendered(device, seed, 3, "owned", "area") for seed in (0, 11)]
     assert any(case.scene.lights for case in cases)
     for fault in (
         lambda case: {"lod": "none"},
