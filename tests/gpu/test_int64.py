@@ -104,3 +104,16 @@ def test_owned_rows_give_the_same_bits_on_random_scenes(zink: dict[str, str]) ->
     done = subprocess.run(command, env=zink, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
     assert "2 passed" in done.stdout
+
+
+@pytest.mark.needs("zink")
+@pytest.mark.shows("64-bit atomics find what the reference sees, and leave no holes")
+def test_64_bit_winners_are_the_references(zink: dict[str, str]) -> None:
+    """What `auto` takes there, by the tests that hold the other paths to the same."""
+    folder = Path(__file__).parent
+    tests = [f"{folder / module}.py" for module in ("test_splat", "test_holes", "test_same_bits")]
+    chosen = "48_views or (camera_sees_a_hole and spheres and default) or (division and default)"
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", chosen, *tests]
+    done = subprocess.run(command, env=zink, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert "3 passed" in done.stdout
