@@ -431,6 +431,28 @@ def test_each_of_very_many_materials_shows(
     assert off.max() < 0.08
 
 
+@pytest.mark.parametrize("technique", TECHNIQUES)
+def test_very_many_materials_that_are_alike_look_like_one(
+    device: Device,
+    small: DisplayProfile,
+    tmp_path: Path,
+    scaled: Callable[[int, int], int],
+    technique: str,
+) -> None:
+    """As glTF has them: so many primitives as well, each a batch's run of its own."""
+    shape = ball(300, 120) if scaled(1, 0) else ball(60, 24)
+    count = scaled(65_536, 1_000)
+    (tmp_path / "one").mkdir()
+    many, one = Scene.load(shape.write_gltf(tmp_path, count)), shape.write_gltf(tmp_path / "one")
+    assert len(many.materials) == count
+    with Renderer(device) as renderer:
+        found, expected = (
+            renderer.render(scene, small, views=8, technique=technique).linear
+            for scene in (many, Scene.load(one))
+        )
+    np.testing.assert_array_equal(found, expected)
+
+
 # ---- the command line -------------------------------------------------------------------------
 
 
