@@ -208,16 +208,11 @@ class Shading:
         return self._chains[image, srgb]
 
 
-def texcoord_sides(corners: Float64) -> Float64:
-    """From the first corner to the others, [pixel, 2, uv], of texture coordinates [pixel, corner,
-    uv]: along one line where they have no area but for rounding."""
-    sides: Float64 = corners[:, 1:] - corners[:, :1]
-    lengths = np.linalg.norm(sides, axis=-1)
-    lost = UV_ROUNDING * np.abs(corners).max(axis=(1, 2)) * lengths.sum(axis=-1)
-    flat = np.abs(np.linalg.det(sides)) <= lost
-    longer = sides[np.arange(len(sides)), lengths.argmax(axis=-1)]
-    along = unit(longer)[:, None]
-    return np.where(flat[:, None, None], _dot(sides, along)[..., None] * along, sides)
+def on_a_line(corners: Float64) -> Bool:
+    """Whether texture coordinates [pixel, corner, uv] have no area but for rounding."""
+    sides = corners[:, 1:] - corners[:, :1]
+    lost = UV_ROUNDING * np.abs(corners).max(axis=(1, 2)) * np.abs(sides).sum(axis=(1, 2))
+    return np.asarray(np.abs(np.linalg.det(sides)) <= lost)
 
 
 class Surface:
@@ -250,7 +245,7 @@ class Surface:
         corners = self._shading.triangles.texcoords[points.ids][:, :, slot.texcoord]
         matrix = np.eye(3) if slot.uv_transform is None else slot.uv_transform
         uv = np.einsum("nc,ncu->nu", points.weights, corners @ matrix[:2, :2].T + matrix[:2, 2])
-        sides = texcoord_sides(corners) @ matrix[:2, :2].T
+        sides = (corners[:, 1:] - corners[:, :1]) @ matrix[:2, :2].T
         uv_dx, uv_dy = (
             np.einsum("nc,ncu->nu", weights[:, 1:], sides)
             for weights in (points.weights_dx, points.weights_dy)
@@ -302,7 +297,8 @@ class Surface:
             + map_normal[:, 2:] * normal
         )
         lengths = np.linalg.norm(uv_dx, axis=1) * np.linalg.norm(uv_dy, axis=1)
-        without = np.abs(determinant) <= LEAST_SINE * lengths
+        corners = self._shading.triangles.texcoords[self._points.ids][:, :, slot.texcoord]
+        without = on_a_line(corners) | (np.abs(determinant) <= LEAST_SINE * lengths)
         without |= (np.sum(tangent**2, axis=1) == 0.0) | (np.sum(bitangent**2, axis=1) == 0.0)
         return np.where(without[:, None], normal, turned)
 

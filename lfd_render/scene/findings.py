@@ -57,8 +57,8 @@ def _areas(
         if texcoord is not None:
             a, b, c = mesh.texcoords[triangles, texcoord].astype(np.float64).transpose(1, 2, 0)
             (us, ut), (vs, vt) = b - a, c - a
-            # As shading has it (`reference.shade.texcoord_sides`).
+            # As shading has it (`reference.shade.on_a_line`).
             largest = np.abs(mesh.texcoords[triangles, texcoord]).max(axis=(1, 2))
-            lost = UV_ROUNDING * largest * (np.hypot(us, ut) + np.hypot(vs, vt))
+            lost = UV_ROUNDING * largest * (abs(us) + abs(ut) + abs(vs) + abs(vt))
             uv_area = np.abs(us * vt - ut * vs) > lost
         yield area, uv_area

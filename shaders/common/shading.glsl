@@ -8,6 +8,7 @@
 const float PI = 3.14159265359;
 const vec3 MOST_RADIANCE = vec3(65504.0);  // what half floats hold
 const float SMALLEST_ALPHA = 0.002;  // keeps the specular peak of a mirror finite
+const float UV_ROUNDING = 5e-7;  // of texture coordinates, relative: what a file's own arithmetic leaves
 const float LEAST_SINE = 2e-6;  // between changes of texture coordinates that are not one line: 32 roundings
 
 struct Surface {
@@ -18,6 +19,8 @@ struct Surface {
     vec3 dp_dy;
     Footprint uv0;
     Footprint uv1;
+    bool line0;        // whether uv0 of this triangle lies on one line, but for rounding
+    bool line1;
     vec4 color;        // vertex colour, linear
     uint material;
     bool back;         // seen from behind
@@ -29,7 +32,8 @@ struct Surface {
 vec3 mapped_normal(vec3 normal, Surface surface, uint slot) {
     Footprint f = slot_footprint(surface.material, NORMAL, surface.uv0, surface.uv1);
     float determinant = f.dx.x * f.dy.y - f.dx.y * f.dy.x;
-    if (abs(determinant) <= LEAST_SINE * length(f.dx) * length(f.dy)) return normal;
+    if (second_set(slot) ? surface.line1 : surface.line0) return normal;
+    if (abs(determinant) <= LEAST_SINE * length(f.dx) * length(f.dy)) return normal;  // a transform that flattens
     vec3 along_u = (surface.dp_dx * f.dy.y - surface.dp_dy * f.dx.y) * sign(determinant);
     vec3 along_v = (surface.dp_dy * f.dx.x - surface.dp_dx * f.dy.x) * sign(determinant);
     vec3 tangent = along_u - normal * dot(normal, along_u);

@@ -21,10 +21,14 @@ struct Footprint {
 
 const vec3 ONE_VIEW = vec3(1.0, 1.0, 0.0);
 
+// Whether a slot reads the second set of texture coordinates.
+bool second_set(uint slot) {
+    return VERTEX_EXTRAS != 0 && (slot >> (SLOT_GROUP_BITS + SLOT_LAYER_BITS)) == 1u;
+}
+
 Footprint slot_footprint(uint material, uint role, Footprint uv0, Footprint uv1) {
     Footprint f = uv0;
-    uint slot = slot_of(material, role);
-    if (VERTEX_EXTRAS != 0 && (slot >> (SLOT_GROUP_BITS + SLOT_LAYER_BITS)) == 1u) f = uv1;
+    if (second_set(slot_of(material, role))) f = uv1;
     if (UV_TRANSFORMS == 0) return f;
     UvTransform transform = uv_transforms[material * TEXTURE_ROLES + role];
     mat2 m = mat2(transform.matrix.xy, transform.matrix.zw);

@@ -15,19 +15,10 @@ uniform float eye_mm;
 
 layout(location = 0) out vec4 radiance;
 
-const float ROUNDING = 5e-7;  // of interpolated coordinates, relative
-
-// Changes that are along one line but for rounding are made so.
-Footprint footprint(vec2 uv) {
-    vec2 dx = dFdx(uv), dy = dFdy(uv);
-    float lost = ROUNDING * max(abs(uv.x), abs(uv.y));
-    if (abs(dx.x * dy.y - dx.y * dy.x) <= lost * (length(dx) + length(dy))) {
-        vec2 longer = dot(dx, dx) > dot(dy, dy) ? dx : dy;
-        vec2 along = longer * inversesqrt(max(1e-30, dot(longer, longer)));
-        dx = along * dot(along, dx);
-        dy = along * dot(along, dy);
-    }
-    return Footprint(uv, dx, dy, ONE_VIEW);
+// By what interpolation loses of coordinates.
+bool on_a_line(vec2 uv, vec2 dx, vec2 dy) {
+    vec2 lengths = abs(dx) + abs(dy);
+    return abs(dx.x * dy.y - dx.y * dy.x) <= UV_ROUNDING * max(abs(uv.x), abs(uv.y)) * (lengths.x + lengths.y);
 }
 
 void main() {
@@ -38,8 +29,10 @@ void main() {
     surface.normal = normal_world;
     surface.dp_dx = turn * dFdx(p_display);
     surface.dp_dy = turn * dFdy(p_display);
-    surface.uv0 = footprint(uv01.xy);
-    surface.uv1 = footprint(uv01.zw);
+    surface.uv0 = Footprint(uv01.xy, dFdx(uv01.xy), dFdy(uv01.xy), ONE_VIEW);
+    surface.uv1 = Footprint(uv01.zw, dFdx(uv01.zw), dFdy(uv01.zw), ONE_VIEW);
+    surface.line0 = on_a_line(surface.uv0.uv, surface.uv0.dx, surface.uv0.dy);
+    surface.line1 = on_a_line(surface.uv1.uv, surface.uv1.dx, surface.uv1.dy);
     surface.color = color;
     surface.material = material;
     surface.back = !gl_FrontFacing;

@@ -40,18 +40,14 @@ Visible visible_pixel() {
     return seen;
 }
 
-const float UV_ROUNDING = 5e-7;  // of texture coordinates, relative: what a file's own arithmetic leaves
+// From vertex a to b and c. What is the same at all three stands still, exactly.
+mat2 sides(mat3x2 uv) {
+    return mat2(uv[1] - uv[0], uv[2] - uv[0]);
+}
 
-// Change of texture coordinates with the weights of vertices b and c. What is the same at all three stands
-// still, and coordinates along one line but for rounding move along it, exactly.
-vec2 change(mat3x2 uv, vec2 weights_change) {
-    vec2 b = uv[1] - uv[0], c = uv[2] - uv[0];
-    vec2 most = max(abs(uv[0]), max(abs(uv[1]), abs(uv[2])));
-    float lost = UV_ROUNDING * max(most.x, most.y) * (length(b) + length(c));
-    if (abs(b.x * c.y - b.y * c.x) > lost) return mat2(b, c) * weights_change;
-    vec2 along = dot(b, b) > dot(c, c) ? b : c;
-    along *= inversesqrt(max(1e-30, dot(along, along)));
-    return along * dot(vec2(dot(along, b), dot(along, c)), weights_change);
+bool on_a_line(mat3x2 uv, mat2 sides) {
+    vec2 most = max(abs(uv[0]), max(abs(uv[1]), abs(uv[2]))), lengths = abs(sides[0]) + abs(sides[1]);
+    return abs(determinant(sides)) <= UV_ROUNDING * max(most.x, most.y) * (lengths.x + lengths.y);
 }
 
 Surface surface_at(uint triangle, int view, int row, int column) {
@@ -73,8 +69,11 @@ Surface surface_at(uint triangle, int view, int row, int column) {
     surface.normal = mat3(vertex_normal(corners.x), vertex_normal(corners.y), vertex_normal(corners.z)) * hit.weights;
     surface.dp_dx = mat3(turn_from_display) * hit.dp_dx;
     surface.dp_dy = mat3(turn_from_display) * hit.dp_dy;
-    surface.uv0 = Footprint(uv0 * hit.weights, change(uv0, hit.weights_dx.yz), change(uv0, hit.weights_dy.yz), views);
-    surface.uv1 = Footprint(uv1 * hit.weights, change(uv1, hit.weights_dx.yz), change(uv1, hit.weights_dy.yz), views);
+    mat2 sides0 = sides(uv0), sides1 = sides(uv1);
+    surface.uv0 = Footprint(uv0 * hit.weights, sides0 * hit.weights_dx.yz, sides0 * hit.weights_dy.yz, views);
+    surface.uv1 = Footprint(uv1 * hit.weights, sides1 * hit.weights_dx.yz, sides1 * hit.weights_dy.yz, views);
+    surface.line0 = on_a_line(uv0, sides0);
+    surface.line1 = on_a_line(uv1, sides1);
     surface.color = mat3x4(vertex_color(corners.x), vertex_color(corners.y), vertex_color(corners.z)) * hit.weights;
     surface.material = draws[corners.w].material;
     surface.back = (eye_side(plane, eye_mm) < 0.0) != ((facing & FACING_MIRRORED) != 0u);

@@ -8,6 +8,7 @@ import dataclasses
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from lfd_render.passes.sample import Sample
 from lfd_render.passes.view_target import ViewTarget
 from lfd_render.reference import Triangles, placed, visible
 from lfd_render.reference.transform import points_by
+from lfd_render.renderer import RenderOptions
 from lfd_render.scene import Instance, Material, Mesh, Scene
 from lfd_render.techniques import Lfdpr
 
@@ -44,11 +46,13 @@ from .helpers import (
 pytestmark = pytest.mark.needs("gl")
 
 PORTRAIT = "looking-glass-portrait-sample-a"
-# What may differ in how pictures are made: Lfdpr's options.
-VARIANTS: dict[str, dict[str, object]] = {
+# What may differ in how pictures are made: options of `RenderOptions`.
+VARIANTS: dict[str, dict[str, Any]] = {
     "default": {},
-    "two-pass": {"winners": "two-pass"},
-    "general": {"general": True},
+    "two-pass": {"splat": "two-pass"},
+    "general": {"projection": "general"},
+    "paper's lattice": {"lattice": "paper"},
+    "paper's front end": {"lattice": "paper", "point_source": "raster"},
 }
 
 
@@ -77,9 +81,9 @@ def nasty(rng: np.random.Generator) -> Scene:
     ground = np.array([[-far, low, far], [far, low, far], [far, low, -far], [-far, low, -far]])
     meshes = [
         mesh_of(ground[[[0, 1, 2], [0, 2, 3]]]),
-        mesh_of(soup(rng, 60, profile), 1),
+        mesh_of(soup(rng, 60 if FULL else 30, profile), 1),
         bumpy_ball(90, 60, 0.25 * height),
-        bumpy_ball(1200, 8, 0.15 * height),  # slivers, 0.1 mm by 20
+        bumpy_ball(1200, 8, 0.15 * height),  # slivers, 0.15 mm by 12
         bumpy_ball(120, 80, 0.005 * height),
     ]
     matrices = []
@@ -160,11 +164,18 @@ class Depths:
     """Depths of a scene before any camera, by one technique that stays."""
 
     def __init__(
-        self, device: Device, buffers: SceneBuffers, rig: Rig, grid: ViewGrid, **options: object
+        self, device: Device, buffers: SceneBuffers, rig: Rig, grid: ViewGrid, **options: Any
     ) -> None:
         self.rig, self.grid = rig, grid
-        target = ViewTarget(device, rig, grid, buffers.batches)
-        self._technique = Lfdpr(device, buffers, target, **options)  # type: ignore[arg-type]
+        choice = RenderOptions(**options)
+        self._technique = Lfdpr(
+            device,
+            buffers,
+            ViewTarget(device, rig, grid, buffers.batches),
+            sampling=choice.sampling,
+            general=choice.projection == "general",
+            winners=choice.splat,
+        )
         self._clock = StageClock(device)
 
     def __call__(self, display_from_world: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -192,7 +203,7 @@ class Depths:
 
 @contextmanager
 def pictures(
-    device: Device, scene: Scene, views: list[tuple[Rig, ViewGrid]], **options: object
+    device: Device, scene: Scene, views: list[tuple[Rig, ViewGrid]], **options: Any
 ) -> Iterator[list[Depths]]:
     """A scene on the device and its pictures by each rig and grid."""
     buffers = SceneBuffers(device, scene)
@@ -340,7 +351,7 @@ def test_a_missing_row_of_points_is_a_hole(
     """Of the wall, in the picture's corner, where background shows through."""
     scene, triangles, matrix = bare
     wall = len(scene.meshes[0].triangles)
-    written = Sample.rows
+    written = Sample.fill
 
     def one_less(self: Sample, batch, points, band, window) -> None:
         written(self, batch, points, band, window)
@@ -354,7 +365,7 @@ def test_a_missing_row_of_points_is_a_hole(
         for planted in (False, True):
             with monkeypatch.context() as patch:
                 if planted:
-                    patch.setattr(Sample, "rows", one_less)
+                    patch.setattr(Sample, "fill", one_less)
                 with pictures(device, scene, [(rig, grid)]) as (depths,):
                     found = judged(depths(matrix), triangles, rig, grid)
             assert len(np.unique(np.nonzero(found.holes)[0])) == planted
