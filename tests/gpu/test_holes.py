@@ -81,7 +81,7 @@ def nasty(rng: np.random.Generator) -> Scene:
     ground = np.array([[-far, low, far], [far, low, far], [far, low, -far], [-far, low, -far]])
     meshes = [
         mesh_of(ground[[[0, 1, 2], [0, 2, 3]]]),
-        mesh_of(soup(rng, 60 if FULL else 30, profile), 1),
+        mesh_of(soup(rng, 30, profile), 1),
         bumpy_ball(90, 60, 0.25 * height),
         bumpy_ball(1200, 8, 0.15 * height),  # slivers, 0.15 mm by 12
         bumpy_ball(120, 80, 0.005 * height),

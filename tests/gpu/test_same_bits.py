@@ -131,7 +131,7 @@ def shuffled(mesh: Mesh, rng: np.random.Generator) -> Mesh:
 
 
 @pytest.mark.shows("bit-identical pictures in any order of triangles")
-@pytest.mark.parametrize("variant", ("default", "two-pass", "general", "paper's lattice"))
+@pytest.mark.parametrize("variant", ["default", "two-pass", "general", "paper's lattice"])
 def test_pictures_do_not_depend_on_the_order_of_triangles(
     device: Device, rng: np.random.Generator, variant: str
 ) -> None:
