@@ -244,7 +244,7 @@ def cases() -> list[tuple[str, str, int]]:
     """Scene, variant, cameras: the default by all there is, the others by fewer."""
     found = [(name, "default", 1000 if FULL else 20) for name in SCENES]
     if FULL:
-        return found + [(name, v, 100) for name in SCENES for v in VARIANTS if v != "default"]
+        return found + [(name, v, 20) for name in SCENES for v in VARIANTS if v != "default"]
     return [*found, *(("nasty", variant, 2) for variant in ("general", "paper's front end"))]
 
 
