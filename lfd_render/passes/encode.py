@@ -10,6 +10,7 @@ from lfd_render.gpu.device import Device
 from lfd_render.gpu.framebuffer import LayerTarget
 from lfd_render.gpu.memory import TextureArray
 from lfd_render.passes.screen import ScreenPass
+from lfd_render.passes.view_target import ViewImages
 
 
 class Encode:
@@ -41,4 +42,34 @@ class Encode:
         """Free everything."""
         self._framebuffer.release()
         self._picture.release()
+        self._pass.release()
+
+
+class EncodeViews:
+    """View images in linear light → the same encoded, [view, row, column, RGBA] bytes."""
+
+    def __init__(self, device: Device, size: tuple[int, int, int]) -> None:
+        """size: columns, rows, views."""
+        self._pass = ScreenPass(device, "encode/encode.frag")
+        self.images = TextureArray(device, "encoded views", size, gl.RGBA8)
+        self.images.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
+        self._layer = LayerTarget(device, self.images, depth=False)
+
+    def __call__(self, linear: ViewImages, rows: int, exposure: float) -> ViewImages:
+        """Encode the first rows of all views."""
+        for view in range(self.images.layers):
+            self._layer.use(view)
+            self._pass(
+                {},
+                {"exposure": exposure, "layer": view},
+                {"linear_image": linear.images},
+                (0, rows),
+                self.images.width,
+            )
+        return ViewImages(self.images, linear.first, linear.shown)
+
+    def release(self) -> None:
+        """Free everything."""
+        self._layer.release()
+        self.images.release()
         self._pass.release()

@@ -18,6 +18,7 @@ from lfd_render.gpu.device import Device
 from lfd_render.gpu.lighting import EnvironmentMap
 from lfd_render.gpu.scene_buffers import SceneBuffers
 from lfd_render.panel.eia import Eia
+from lfd_render.panel.stage import PanelOptions
 from lfd_render.passes.encode import Encode
 from lfd_render.passes.placement import Placement
 from lfd_render.passes.prefilter import Prefilter
@@ -101,7 +102,9 @@ class Renderer:
 
         def compile_all() -> PanelFrames:
             technique = self._technique(buffers, rig, grid, choice)
-            frames = PanelFrames(self.device, technique, display, choice.exposure)
+            frames = PanelFrames(
+                self.device, technique, display, grid, PanelOptions(exposure=choice.exposure)
+            )
             frames.warm_up(Placement(camera.display_from_world(rig.panel_mm), choice.background))
             return frames
 
