@@ -1,11 +1,14 @@
 """`lfd-render render`: a scene becomes the panel image of a display."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from lfd_render.cli import options
-from lfd_render.cli.console import Stopwatch, print_json, progress, say, warn
+from lfd_render.cli.console import Stopwatch, print_json, progress, progress_bar, say, warn
 from lfd_render.cli.inputs import (
     display_warnings,
     load_display,
@@ -27,6 +30,11 @@ def render(
     view_size: options.ViewSizeOption = None,
     technique: options.TechniqueOption = options.Technique.LFDPR,
     preset: options.PresetOption = options.Preset.DEFAULT,
+    lookup: options.LookupOption = options.Lookup.LENS,
+    weave: options.WeavingOption = options.Weaving.NEAREST,
+    aa: options.FilterOption = None,
+    aa_light: options.FilterLightOption = options.FilterLight.LINEAR,
+    supersample: options.SupersampleOption = "none",
     splat: options.SplatOption = options.Splat.AUTO,
     camera: options.CameraOption = None,
     focus_distance: options.FocusDistanceOption = None,
@@ -54,6 +62,8 @@ def render(
 ) -> None:
     """Render SCENE into the panel image (EIA) of a display."""
     size = options.parse_view_size(view_size)
+    count = options.parse_views(views)
+    samples = options.parse_supersample(supersample)
     options.check_device(device)
     check_picture_output(output, json)
 
@@ -79,15 +89,24 @@ def render(
 
     from lfd_render.renderer import Renderer  # noqa: PLC0415 (keeps --help quick)
 
-    with progress("Rendering"), Renderer(device=device) as renderer:
+    shown = progress_bar if preset == options.Preset.GOLD or count == "continuous" else _status
+    with shown("Rendering") as done, Renderer(device=device) as renderer:
         eia = renderer.render(
             loaded,
             profile,
             window,
-            views=views,
+            views=count,
+            progress=done,
             view_size=size,
             technique=technique.value,
             preset=preset.value,
+            lookup=lookup.value,
+            weave=weave.value,
+            aa=aa.value if aa else None,
+            aa_light=aa_light.value,
+            supersample=samples,
+            # Views are woven faster where nobody asks for linear pixels.
+            linear=Path(output).suffix.lower() != ".png",
             splat=splat.value,
             spacing=spacing.value if spacing else None,
             lod=lod.value if lod else None,
@@ -120,3 +139,10 @@ def render(
         f"{output}: {width} × {height}, {eia.report['views']} views by {technique.value}, "
         f"a frame in {watch.timings_ms['frame']:.0f} ms on {eia.report['renderer']}"
     )
+
+
+@contextmanager
+def _status(message: str) -> Iterator[None]:
+    """What is shown of work too short for a bar."""
+    with progress(message):
+        yield None

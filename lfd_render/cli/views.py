@@ -43,6 +43,7 @@ def views(
     view_size: options.ViewSizeOption = None,
     technique: options.TechniqueOption = options.Technique.LFDPR,
     preset: options.PresetOption = options.Preset.DEFAULT,
+    supersample: options.SupersampleOption = "none",
     camera: options.CameraOption = None,
     focus_distance: options.FocusDistanceOption = None,
     yaw: options.YawOption = 0.0,
@@ -66,6 +67,7 @@ def views(
 ) -> None:
     """Write the single upright views of SCENE, view_000.png leftmost."""
     size = options.parse_view_size(view_size)
+    samples = options.parse_supersample(supersample)
     options.check_device(device)
     folder = check_folder_output(output)
 
@@ -100,6 +102,7 @@ def views(
             view_size=size,
             technique=technique.value,
             preset=preset.value,
+            supersample=samples,
             spacing=spacing.value if spacing else None,
             lod=lod.value if lod else None,
             lattice=lattice.value if lattice else None,

@@ -5,7 +5,7 @@ from lfd_render.display.grid import ViewGrid
 from lfd_render.display.phase import PhaseTables, view_index
 from lfd_render.display.profile import DisplayProfile, shipped_profiles
 from lfd_render.display.reconstruction import Reconstruction
-from lfd_render.display.rig import Rig, eye_from_slot, slot_from_angle
+from lfd_render.display.rig import Rig, eye_from_slot, slot_from_angle, slot_from_eye
 
 __all__ = [
     "Camera",
@@ -18,5 +18,6 @@ __all__ = [
     "eye_from_slot",
     "shipped_profiles",
     "slot_from_angle",
+    "slot_from_eye",
     "view_index",
 ]

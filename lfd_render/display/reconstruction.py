@@ -1,8 +1,9 @@
 """How a subpixel's colour is put together from view images, and the samples of its filter.
 
-A subpixel of phase φ lies at the view coordinate a = N·(1 − frac φ), where view i covers i to i + 1,
-on the window at u = (q + center)/P − v·T with q = ⌊φ⌋ + ½ (`lens`) or φ (`subpixel`), and at the row
-coordinate (y + ½)·rows/H. Views are looked up there, the nearest or two of them, or filtered about it.
+A subpixel of phase φ lies at the view coordinate a = N·(1 − frac φ), where view i covers i to
+i + 1, on the window at u = (q + center)/P − v·T with q = ⌊φ⌋ + ½ (`lens`) or φ (`subpixel`), and at
+the row coordinate (y + ½)·rows/H. Views are looked up there, the nearest or two of them, or
+filtered about it.
 """
 
 from __future__ import annotations
@@ -29,11 +30,12 @@ _DRAWS = 400
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """lookup: where views are sampled, of LOOKUPS; weave: the nearest view or linear between two, of
-    WEAVES; aa: Gaussian filter over view pixels, views or both, of FILTERS, by `samples` samples.
+    """lookup: where views are sampled, of LOOKUPS; weave: the nearest view or linear between two,
+    of WEAVES; aa: Gaussian filter over view pixels, views or both, of FILTERS, by `samples`
+    samples.
 
-    pixel: what is a view pixel to the filter, in columns and rows of the view images. Raises
-    UsageError.
+    pixel: what is a view pixel to the filter, in columns and rows of the view images; view: what is
+    a view interval to it, in views. Raises UsageError.
     """
 
     lookup: str = "lens"
@@ -41,6 +43,7 @@ class Reconstruction:
     aa: str = "none"
     samples: int = FILTER_SAMPLES
     pixel: tuple[float, float] = (1.0, 1.0)
+    view: float = 1.0
 
     def __post_init__(self) -> None:
         """Check the choices."""
@@ -74,8 +77,13 @@ class Reconstruction:
         """Samples about a subpixel, [sample, 3]: columns, rows, views; one of zeros unfiltered."""
         if self.aa == "none":
             return np.zeros((1, 3))
-        reach = (self.spatial * self.pixel[0], self.spatial * self.pixel[1], float(self.angular))
-        return gaussian_samples(self.samples) * np.array(reach)
+        reach = (
+            self.spatial * self.pixel[0],
+            self.spatial * self.pixel[1],
+            self.angular * self.view,
+        )
+        found: NDArray[np.float64] = gaussian_samples(self.samples) * np.array(reach)
+        return found
 
     @property
     def halo(self) -> int:

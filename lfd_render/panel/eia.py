@@ -16,10 +16,11 @@ from lfd_render.panel.picture import write_png
 @dataclass(frozen=True, eq=False)
 class Eia:
     """A panel image. pixels: uint8 [y, x, 3], sRGB; linear: float16 [y, x, 3], scene-linear light
-    before exposure and tone curve; report: what was rendered, how, and how long it took."""
+    before exposure and tone curve, None where it was not asked for; report: what was rendered, how,
+    and how long it took."""
 
     pixels: NDArray[np.uint8]
-    linear: NDArray[np.float16]
+    linear: NDArray[np.float16] | None
     report: dict[str, Any] = field(default_factory=dict)
     metadata: dict[str, str] = field(default_factory=dict)
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from lfd_render.display import DisplayProfile, Reconstruction, ViewGrid
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
+from lfd_render.passes.average import Average
 from lfd_render.passes.encode import Encode, EncodeViews
 from lfd_render.passes.view_target import Band, ViewTarget
 from lfd_render.passes.weave import Weave, is_exact
@@ -24,10 +25,12 @@ LIGHTS = ("linear", "encoded")
 
 @dataclass(frozen=True)
 class PanelOptions:
-    """rule: how views are put together; light: what a filter averages, of LIGHTS; linear: whether
-    scene-linear panel pixels are asked for beside the encoded ones."""
+    """rule: how views are put together; eyes: how many make up a view; light: what a filter
+    averages, of LIGHTS; linear: whether scene-linear panel pixels are asked for beside the encoded
+    ones."""
 
     rule: Reconstruction = field(default_factory=Reconstruction)
+    eyes: int = 1
     exposure: float = 1.0
     light: str = "linear"
     linear: bool = True
@@ -44,8 +47,13 @@ class PanelStage:
         target: ViewTarget,
         options: PanelOptions,
     ) -> None:
+        """grid: the pixels of the views that are woven, of which the target's may be finer."""
         self._options = options
-        views = target.rig.views
+        views = target.rig.views // options.eyes
+        times = target.grid.rows // grid.rows
+        self._average: Average | None = None
+        if max(options.eyes, times) > 1:
+            self._average = Average(device, target, eyes=options.eyes, times=times)
         exact = is_exact(options.rule, grid)
         encoded_first = options.light == "encoded" or (exact and not options.linear)
         self._encode_views: EncodeViews | None = None
@@ -53,7 +61,9 @@ class PanelStage:
         self._weave: Weave | None = None
         self._encode: Encode | None = None
         if encoded_first:
-            self._encode_views = EncodeViews(device, (grid.columns, target.band_rows, views))
+            self._encode_views = EncodeViews(
+                device, (grid.columns, target.band_rows // times, views)
+            )
             self._codes = Weave(device, display, grid, views, options.rule, encoded=True)
         if options.linear or not encoded_first:
             self._weave = Weave(device, display, grid, views, options.rule)
@@ -63,9 +73,12 @@ class PanelStage:
     def band(self, band: Band, clock: StageClock) -> None:
         """Weave what a band of view images shows."""
         images = band.view_images()
+        if self._average:
+            with clock.stage("average"):
+                images = self._average(band)
         if self._encode_views and self._codes:
             with clock.stage("encode_srgb"):
-                encoded = self._encode_views(images, band.rows, self._options.exposure)
+                encoded = self._encode_views(images, self._options.exposure)
             with clock.stage("weave"):
                 self._codes(encoded)
         if self._weave:
@@ -88,6 +101,6 @@ class PanelStage:
 
     def release(self) -> None:
         """Free everything."""
-        for owner in (self._encode_views, self._codes, self._weave, self._encode):
+        for owner in (self._average, self._encode_views, self._codes, self._weave, self._encode):
             if owner:
                 owner.release()

@@ -55,15 +55,15 @@ class EncodeViews:
         self.images.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
         self._layer = LayerTarget(device, self.images, depth=False)
 
-    def __call__(self, linear: ViewImages, rows: int, exposure: float) -> ViewImages:
-        """Encode the first rows of all views."""
+    def __call__(self, linear: ViewImages, exposure: float) -> ViewImages:
+        """Encode the rows of all views."""
         for view in range(self.images.layers):
             self._layer.use(view)
             self._pass(
                 {},
                 {"exposure": exposure, "layer": view},
                 {"linear_image": linear.images},
-                (0, rows),
+                (0, self.images.height),
                 self.images.width,
             )
         return ViewImages(self.images, linear.first, linear.shown)

@@ -24,8 +24,8 @@ MOST_BAND_ROWS = 1000  # with at most 4 Mi triangles a batch, items stay below 2
 
 @dataclass(frozen=True, eq=False)
 class ViewImages:
-    """Images of all views, [view, row, column], whose row 0 is view row `first`; the panel rows that
-    show the view rows `shown`, [first, end), can be woven from them."""
+    """Images of all views, [view, row, column], whose row 0 is view row `first`; the panel rows
+    that show the view rows `shown`, [first, end), can be woven from them."""
 
     images: TextureArray
     first: int
@@ -34,8 +34,8 @@ class ViewImages:
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """Rows [first, first + rows) of the views of a target; the panel takes those in `shown`, [first,
-    end), and a filter what lies around them."""
+    """Rows [first, first + rows) of the views of a target; the panel takes those in `shown`,
+    [first, end), and a filter what lies around them."""
 
     target: ViewTarget
     first: int
@@ -65,8 +65,8 @@ class ViewTarget:
         row_step: int = 1,
         halo: int = 0,
     ) -> None:
-        """row_step: bands hold a multiple of so many rows. halo: rows around those shown, a multiple
-        of it too."""
+        """row_step: bands hold a multiple of so many rows. halo: rows around those shown, a
+        multiple of it too."""
         assert grid.rows % row_step == halo % row_step == 0
         self.rig = rig
         self.grid = grid

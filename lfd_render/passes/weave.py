@@ -12,9 +12,9 @@ from lfd_render.gpu import raw as gl
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.framebuffer import LayerTarget
 from lfd_render.gpu.memory import TableTexture, TextureArray
-from lfd_render.gpu.programs import Uniform
+from lfd_render.gpu.programs import Samplers, Uniform
 from lfd_render.passes.screen import ScreenPass
-from lfd_render.passes.view_target import ViewImages
+from lfd_render.passes.view_target import Band, ViewImages
 
 NO_ROW = 0xFFFFFFFF
 MOST_INDEXED_VIEWS = 1 << 10  # what places.frag has bits for
@@ -52,8 +52,9 @@ class Weave:
         self.panel = TextureArray(device, "panel image", (width, height, 1), form)
         self.framebuffer = LayerTarget(device, self.panel, depth=False)
 
-    def __call__(self, images: ViewImages) -> None:
+    def __call__(self, shown: ViewImages | Band) -> None:
         """Weave the panel rows that show these view rows."""
+        images = shown.view_images() if isinstance(shown, Band) else shown
         width, height = self._profile.resolution_px
         starts = self._grid.first_panel_rows(height)
         first, end = images.shown
@@ -96,9 +97,7 @@ class _Step(Protocol):
 class _Phases:
     """The tables that give subpixels their phases, and the constants that go with them."""
 
-    def __init__(
-        self, device: Device, profile: DisplayProfile, grid: ViewGrid, views: int
-    ) -> None:
+    def __init__(self, device: Device, profile: DisplayProfile, grid: ViewGrid, views: int) -> None:
         tables = profile.phase_tables()
         fixed = tables.fixed(views)
         height = profile.resolution_px[1]
@@ -150,7 +149,7 @@ class _Nearest:
         self._pass = ScreenPass(device, "weave/nearest.frag", phases.constants)
 
     def __call__(self, images: ViewImages, rows: tuple[int, int], width: int) -> None:
-        samplers = {"places": self._places, "view_images": images.images}
+        samplers: Samplers = {"places": self._places, "view_images": images.images}
         self._pass({}, {"first_row": images.first}, samplers, rows, width)
 
     def release(self) -> None:
@@ -195,7 +194,7 @@ class _Mixed:
         }
 
     def __call__(self, images: ViewImages, rows: tuple[int, int], width: int) -> None:
-        samplers = {
+        samplers: Samplers = {
             **self._phases.textures,
             "row_samples": self._rows,
             "view_images": images.images,

@@ -4,10 +4,12 @@ The phase φ of a subpixel (`display.phase`) gives its lens ⌊φ⌋ and its vie
 z = 1 − frac φ; view ⌊a⌋ is the nearest. Where that view is sampled and what is mixed or filtered is
 `display.reconstruction`'s to say:
 
-- unfiltered: on the view row that the panel row lies in, at the lens centre or the subpixel itself.
-  Where views follow the lenses the lens's own column is taken; anywhere else two columns are mixed.
-- filtered: the mean of nearest view pixels at fixed offsets in columns, rows and views. Offsets that
-  lead out of the rows or beyond the first and last view do not count; columns end in their last.
+- unfiltered: on the view row that the panel row lies in, at the lens centre or the subpixel
+  itself. Where views follow the lenses the lens's own column is taken; anywhere else two columns
+  are mixed.
+- filtered: the mean of nearest view pixels at fixed offsets in columns, rows and views. Offsets
+  that lead out of the rows or beyond the first and last view do not count; columns end in their
+  last.
 """
 
 from __future__ import annotations
@@ -42,7 +44,7 @@ def woven(
     for start in range(0, height, _BLOCK_ROWS):
         rows = slice(start, min(start + _BLOCK_ROWS, height))
         y = np.arange(height)[rows][:, None, None]
-        panel[rows] = block(views, tables.phase(rows), y, profile, grid, rule)
+        panel[rows] = block(views, tables.phase(rows), y, profile=profile, grid=grid, rule=rule)
     return panel
 
 
@@ -50,6 +52,7 @@ def _mixed(
     views: NDArray[np.floating],
     phase: Float64,
     y: Int,
+    *,
     profile: DisplayProfile,
     grid: ViewGrid,
     rule: Reconstruction,
@@ -57,7 +60,9 @@ def _mixed(
     """Unfiltered subpixels [y, x, channel] of panel rows y, given their phases."""
     height = profile.resolution_px[1]
     row = ((y + 0.5) / height * grid.rows).astype(np.int64)
-    column = columns_of(phase, y, row, profile, grid, rule) - 0.5  # counted in column centres
+    column = (
+        columns_of(phase, y, row, profile=profile, grid=grid, rule=rule) - 0.5
+    )  # counted in column centres
     if grid.kind == "lens" and rule.lookup == "lens":
         left = np.floor(phase).astype(np.int64) - grid.row_base[row]
         across = np.zeros(1)
@@ -89,6 +94,7 @@ def _filtered(
     views: NDArray[np.floating],
     phase: Float64,
     y: Int,
+    *,
     profile: DisplayProfile,
     grid: ViewGrid,
     rule: Reconstruction,
@@ -105,7 +111,9 @@ def _filtered(
         view[at_view + apart == count] = count - 1  # the last view's far end
         inside = (row >= 0) & (row < grid.rows) & (view >= 0) & (view < count)
         row, view = np.clip(row, 0, grid.rows - 1), np.clip(view, 0, count - 1)
-        column = np.floor(columns_of(phase, y, row, profile, grid, rule) + columns).astype(np.int64)
+        column = np.floor(
+            columns_of(phase, y, row, profile=profile, grid=grid, rule=rule) + columns
+        ).astype(np.int64)
         column = np.clip(column, 0, grid.columns - 1)
         total += inside * views[view, row, column, np.arange(3)].astype(np.float64)
         weight += inside
@@ -116,6 +124,7 @@ def columns_of(
     phase: Float64,
     y: Int,
     row: Int,
+    *,
     profile: DisplayProfile,
     grid: ViewGrid,
     rule: Reconstruction,

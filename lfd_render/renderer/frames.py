@@ -65,17 +65,21 @@ class PanelFrames:
         self._panel.band(self.technique.target.warm_up_band, clock)
         self._panel.finish(clock)
 
-    def run(self, placement: Placement) -> tuple[float, dict[str, float]]:
-        """One frame: its milliseconds, whole and by stage."""
+    def run(
+        self, placement: Placement, progress: Callable[[float], None]
+    ) -> tuple[float, dict[str, float]]:
+        """One frame: its milliseconds, whole and by stage. progress: told the part that is done."""
         complete = False
         while not complete:
             clock = StageClock(self._device)
             self._device.finish()
             start = time.perf_counter()
             self.technique.begin(placement, clock)
-            for band in self.technique.target.bands:
+            bands = self.technique.target.bands
+            for index, band in enumerate(bands):
                 self.technique.render(band, clock)
                 self._panel.band(band, clock)
+                progress((index + 1) / len(bands))
             self._panel.finish(clock)
             self._device.finish()
             elapsed_ms = 1000.0 * (time.perf_counter() - start)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
+from functools import partial
 from types import TracebackType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lfd_render.display import Camera, DisplayProfile, Rig, ViewGrid
+from lfd_render.display import Camera, DisplayProfile, Rig
 from lfd_render.errors import ResourceError, SceneError, UsageError
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
@@ -19,16 +20,19 @@ from lfd_render.gpu.lighting import EnvironmentMap
 from lfd_render.gpu.scene_buffers import SceneBuffers
 from lfd_render.panel.eia import Eia
 from lfd_render.panel.stage import PanelOptions
+from lfd_render.passes.average import Average
 from lfd_render.passes.encode import Encode
 from lfd_render.passes.placement import Placement
 from lfd_render.passes.prefilter import Prefilter
 from lfd_render.passes.view_target import ViewTarget
 from lfd_render.renderer.frames import PanelFrames, Timings
-from lfd_render.renderer.options import MOST_VIEWS, RenderOptions
+from lfd_render.renderer.options import RenderOptions
+from lfd_render.renderer.plan import ViewPlan, plan_panel, plan_views, upright_size
 from lfd_render.scene import Environment, Scene
 from lfd_render.techniques import Lfdpr, Mvr, Technique
 
 REPEAT_TURN_RAD = np.deg2rad(0.5)  # how far the scene turns between repeated frames
+MOST_EYES = 2048
 MOST_VIEW_PIXELS = 1 << 32  # of all views together: hours on a processor, and far above any panel
 
 
@@ -76,35 +80,45 @@ class Renderer:
         scene: Scene,
         display: DisplayProfile,
         camera: Camera | None = None,
-        views: int | None = None,
+        views: int | Literal["continuous"] | None = None,
+        *,
+        progress: Callable[[float], None] | None = None,
         **options: Any,
     ) -> Eia:
         """Render a scene into the panel image of a display.
 
         camera: where the display's window stands in the world; None uses the scene's own or frames
-        it. views: number of views, the profile's by default. options: those of RenderOptions.
+        it. views: number of views, the profile's by default. progress: told the part of all frames
+        that is done, 0 to 1. options: those of RenderOptions.
         Raises SceneError, UsageError, ResourceError or GpuError.
         """
         _check_kinds(scene, display, camera)
         choice = RenderOptions(views=views, **options)
         with self._call():
-            return self._render(scene, display, camera or camera_for(scene, display), choice)
+            window = camera or camera_for(scene, display)
+            return self._render(scene, display, window, choice, progress or (lambda _: None))
 
     def _render(
-        self, scene: Scene, display: DisplayProfile, camera: Camera, choice: RenderOptions
+        self,
+        scene: Scene,
+        display: DisplayProfile,
+        camera: Camera,
+        choice: RenderOptions,
+        progress: Callable[[float], None],
     ) -> Eia:
-        rig = display.rig(choice.views, choice.spacing)
-        grid = _grid(display, choice, rig.views)
-        _check_size(grid, rig.views)
+        plan = plan_panel(display, choice)
+        rig, grid = plan.rig, plan.grid
+        _check_size(plan)
         _check_in_front(scene, camera, rig)
         timings = Timings()
         buffers = self._upload(scene, choice, timings)
 
         def compile_all() -> PanelFrames:
-            technique = self._technique(buffers, rig, grid, choice)
-            frames = PanelFrames(
-                self.device, technique, display, grid, PanelOptions(exposure=choice.exposure)
+            technique = self._technique(buffers, plan, choice)
+            panel = PanelOptions(
+                plan.rule, plan.eyes, choice.exposure, choice.aa_light, choice.linear
             )
+            frames = PanelFrames(self.device, technique, display, grid, panel)
             frames.warm_up(Placement(camera.display_from_world(rig.panel_mm), choice.background))
             return frames
 
@@ -112,15 +126,22 @@ class Renderer:
         for index in range(choice.repeat):
             turned = camera.turned((index - choice.repeat + 1) * float(REPEAT_TURN_RAD))
             matrix = turned.display_from_world(rig.panel_mm)
-            timings.frames.append(frames.run(Placement(matrix, choice.background)))
+            placement = Placement(matrix, choice.background)
+            done = partial(_part_done, progress, index, choice.repeat)
+            timings.frames.append(frames.run(placement, done))
         linear, pixels = timings.measure("read", self.device, frames.read)
         report = {
             "technique": choice.technique,
             "preset": choice.preset,
             "lod": choice.lod_rule,
-            "views": rig.views,
+            "views": plan.views,
+            "eyes": rig.views,
             "view_size": [grid.columns, grid.rows],
             "view_grid": grid.kind,
+            "lookup": plan.rule.lookup,
+            "weave": plan.rule.weave,
+            "aa": plan.rule.aa,
+            "supersample": list(choice.supersample),
             "triangles": scene.triangle_count,
             **_point_report(frames.technique, choice),
             "renderer": self.device.name,
@@ -136,7 +157,8 @@ class Renderer:
         metadata = {
             "lfd:profile": display.name,
             "lfd:profile-hash": display.hash,
-            "lfd:views": str(rig.views),
+            # As many as make the rows of the views; of continuous ones, the display's.
+            "lfd:views": str(display.views if choice.views == "continuous" else plan.views),
             "lfd:technique": choice.technique,
             "lfd:seed": str(choice.seed),
         }
@@ -158,26 +180,33 @@ class Renderer:
         """
         _check_kinds(scene, display, camera)
         choice = RenderOptions(views=views, **options)
-        rig = rig or display.rig(choice.views, choice.spacing)
+        if choice.views == "continuous":
+            raise UsageError("views 'continuous': is for panel images; give a number")
+        if rig is not None and choice.supersample[1] > 1:
+            raise UsageError("supersample: eyes of your own cannot be multiplied; use 1 eye a view")
+        size = choice.view_size or upright_size(display, display.views)
+        plan = plan_views(display, choice, rig, size)
         with self._call():
-            return self._views(scene, display, camera or camera_for(scene, display), rig, choice)
+            return self._views(scene, display, camera or camera_for(scene, display), plan, choice)
 
     def _views(
         self,
         scene: Scene,
         display: DisplayProfile,
         camera: Camera,
-        rig: Rig,
+        plan: ViewPlan,
         choice: RenderOptions,
     ) -> NDArray[np.uint8]:
-        width, height = choice.view_size or upright_size(display, display.views)
-        grid = ViewGrid.upright(display, width, height)
-        _check_size(grid, rig.views)
-        _check_in_front(scene, camera, rig)
+        grid = plan.grid
+        _check_size(plan)
+        _check_in_front(scene, camera, plan.rig)
         buffers = self._upload(scene, choice, Timings())
-        technique = self._technique(buffers, rig, grid, choice)
-        encode = Encode(self.device, grid.columns, technique.target.images.height)
-        pictures = np.empty((rig.views, grid.rows, grid.columns, 3), np.uint8)
+        technique = self._technique(buffers, plan, choice)
+        target = technique.target
+        average = Average(self.device, target, eyes=plan.eyes, times=plan.times)
+        averaged = max(plan.eyes, plan.times) > 1
+        encode = Encode(self.device, grid.columns, target.band_rows // plan.times)
+        pictures = np.empty((plan.views, grid.rows, grid.columns, 3), np.uint8)
         clock = StageClock(self.device)
         technique.begin(
             Placement(camera.display_from_world(display.size_mm), choice.background), clock
@@ -185,13 +214,14 @@ class Renderer:
         technique.warm_up(clock)  # which also makes room for the points of this very placement
         for band in technique.target.bands:
             technique.render(band, clock)
-            for view in range(rig.views):
-                encode(technique.target.images, view, choice.exposure)
-                rows = slice(band.first, band.first + band.rows)
-                pictures[view, rows] = encode.read()[: band.rows]
+            found = average(band) if averaged else band.view_images()
+            rows = slice(*found.shown)
+            for view in range(plan.views):
+                encode(found.images, view, choice.exposure)
+                pictures[view, rows] = encode.read()[: rows.stop - rows.start]
         self.device.check()
-        technique.release()
-        encode.release()
+        for owner in (technique, encode, average):
+            owner.release()
         return pictures
 
     @contextmanager
@@ -248,10 +278,16 @@ class Renderer:
             self._environment_map.release()
             self._environment_map = self._environment = None
 
-    def _technique(
-        self, buffers: SceneBuffers, rig: Rig, grid: ViewGrid, choice: RenderOptions
-    ) -> Technique:
-        target = ViewTarget(self.device, rig, grid, buffers.batches, choice.seed)
+    def _technique(self, buffers: SceneBuffers, plan: ViewPlan, choice: RenderOptions) -> Technique:
+        target = ViewTarget(
+            self.device,
+            plan.rig,
+            plan.rendered,
+            buffers.batches,
+            choice.seed,
+            row_step=plan.times,
+            halo=plan.halo,
+        )
         if choice.technique == "mvr":
             return Mvr(self.device, buffers, target, lod=choice.lod_rule)
         return Lfdpr(
@@ -285,21 +321,8 @@ def camera_for(scene: Scene, display: DisplayProfile) -> Camera:
     return Camera.frame(*scene.bounds(), display)
 
 
-def upright_size(display: DisplayProfile, views: int) -> tuple[int, int]:
-    """Width and height of upright views: one column a lens, all views together as large as the
-    panel."""
-    rows = ViewGrid.default_rows(display, views)
-    width, height = display.resolution_px
-    return max(1, round(width * height / (views * rows))), rows
-
-
-def _grid(display: DisplayProfile, choice: RenderOptions, views: int) -> ViewGrid:
-    if choice.view_size is not None:
-        return ViewGrid.upright(display, *choice.view_size)
-    rows = ViewGrid.default_rows(display, views)
-    if choice.preset == "paper":
-        return ViewGrid.upright(display, *upright_size(display, views))
-    return (ViewGrid.sheared if choice.technique == "mvr" else ViewGrid.lens)(display, rows)
+def _part_done(progress: Callable[[float], None], frame: int, frames: int, part: float) -> None:
+    progress((frame + part) / frames)
 
 
 def _check_kinds(scene: object, display: object, camera: object) -> None:
@@ -314,14 +337,15 @@ def _check_kinds(scene: object, display: object, camera: object) -> None:
             raise UsageError(f"{argument}: {value!r}; give a {name}, as {name}.load(…) makes")
 
 
-def _check_size(grid: ViewGrid, views: int) -> None:
+def _check_size(plan: ViewPlan) -> None:
     """Raise ResourceError for more view pixels than anyone waits for."""
-    if views > MOST_VIEWS:
-        raise UsageError(f"views: {views} is out of range; use 1 to {MOST_VIEWS}")
-    pixels = views * grid.columns * grid.rows
+    eyes, grid = plan.rig.views, plan.rendered
+    if eyes > MOST_EYES:
+        raise UsageError(f"views: {eyes} eyes are too many; use at most {MOST_EYES}")
+    pixels = eyes * grid.columns * grid.rows
     if pixels > MOST_VIEW_PIXELS:
         raise ResourceError(
-            f"views: {views} of {grid.columns}×{grid.rows} are {pixels} pixels, more than "
+            f"views: {eyes} of {grid.columns}×{grid.rows} are {pixels} pixels, more than "
             f"{MOST_VIEW_PIXELS}; use fewer or smaller views"
         )
 

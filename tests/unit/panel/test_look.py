@@ -72,7 +72,8 @@ def test_beyond_the_cone_the_views_repeat() -> None:
 def test_nearest_subpixels_are_those_of_a_full_search(mode: int | None, z: float) -> None:
     profile = small(PAPER, mode)
     grid = ViewGrid.lens(profile, 5)
-    x, y, miss = nearest_subpixels(profile, grid, z)
+    lens = grid.row_base[:, None] + np.arange(grid.columns)
+    x, y, miss = nearest_subpixels(profile, grid, lens + (1 - z) % 1)
     phase = profile.phase_map()
     view_row = np.floor((np.arange(24) + 0.5) * 5 / 24).astype(int)
     for row, column, c in np.ndindex(miss.shape):
@@ -92,7 +93,8 @@ def test_nearest_subpixels_are_those_of_a_full_search(mode: int | None, z: float
 def test_no_view_is_farther_than_stated_on_the_papers_display() -> None:
     grid = ViewGrid.lens(PAPER, 360)
     for z in (np.arange(0, 24, 5) + 0.5) / VIEWS:
-        *_, miss = nearest_subpixels(PAPER, grid, float(z))
+        lens = grid.row_base[:, None] + np.arange(grid.columns)
+        *_, miss = nearest_subpixels(PAPER, grid, lens + (1 - z) % 1)
         assert miss[:, 2:-2].max() * VIEWS < 0.54  # the outer lenses may be cut off
 
 
