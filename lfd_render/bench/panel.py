@@ -21,7 +21,7 @@ import json
 import math
 import statistics
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -70,9 +70,9 @@ class Study:
     moves by `step` of a view interval each; gold_size: pixels of the gold standard's views."""
 
     scene: str = SCENE
-    compared: int = 5
+    compared: int = 3
     samples: int = 4
-    frames: int = 33
+    frames: int = 17
     step: float = 0.125
     gold_views: int = 96
     gold_size: tuple[int, int] | None = None
@@ -132,9 +132,14 @@ class Eyes:
 
 
 def measure(
-    renderer: Renderer, display: DisplayProfile, study: Study, pictures: Path | None = None
+    renderer: Renderer,
+    display: DisplayProfile,
+    study: Study,
+    pictures: Path | None = None,
+    told: Callable[[Result], None] = lambda _: None,
 ) -> list[Result]:
     """Every way against the slow pictures; pictures: a folder for what three eyes see, or None.
+    told: called with each result as it is found.
 
     Raises UsageError without scikit-image or flip-evaluator.
     """
@@ -154,7 +159,7 @@ def measure(
         pictures.mkdir(parents=True, exist_ok=True)
         _write(pictures / "panel-camera.jpg", eyes.true(shown))
         _write(pictures / "panel-gold.jpg", eyes.seen(gold, shown))
-    results = []
+    results: list[Result] = []
     for way in study.ways:
         eia = renderer.render(scene, display, linear=False, **WAYS[way])
         if pictures is not None and way in SHOWN:
@@ -174,6 +179,7 @@ def measure(
                 eia.report["timings_ms"]["frame"],
             )
         )
+        told(results[-1])
     return results
 
 
@@ -228,7 +234,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     study = Study(**options)
     try:
         with Renderer(device) as renderer:
-            results = measure(renderer, DisplayProfile.load(DISPLAY), study, pictures)
+            results = measure(
+                renderer,
+                DisplayProfile.load(DISPLAY),
+                study,
+                pictures,
+                told=lambda result: print(result, file=sys.stderr, flush=True),
+            )
             device_name = renderer.device.name
     except LfdError as error:
         print(f"error: {error}", file=sys.stderr)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Protocol
 
 import numpy as np
@@ -12,7 +13,7 @@ from lfd_render.gpu import raw as gl
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.framebuffer import LayerTarget
 from lfd_render.gpu.memory import TableTexture, TextureArray
-from lfd_render.gpu.programs import Samplers, Uniform
+from lfd_render.gpu.programs import Kernel, Samplers, Uniform
 from lfd_render.passes.screen import ScreenPass
 from lfd_render.passes.view_target import Band, ViewImages
 
@@ -46,11 +47,13 @@ class Weave:
             kind = _Filtered
         else:
             kind = _Nearest if is_exact(rule, grid) and _has_bits(grid, views) else _Mixed
-        self._step: _Step = kind(device, profile, grid, views, rule)
         width, height = profile.resolution_px
         form = gl.RGBA8 if encoded else gl.RGBA16F
         self.panel = TextureArray(device, "panel image", (width, height, 1), form)
         self.framebuffer = LayerTarget(device, self.panel, depth=False)
+        self._step: _Step = kind(device, profile, grid, views, rule)
+        if isinstance(self._step, _Nearest):
+            self._step.choose(self.panel, self.framebuffer)
 
     def __call__(self, shown: ViewImages | Band) -> None:
         """Weave the panel rows that show these view rows."""
@@ -146,14 +149,54 @@ class _Nearest:
         make_map({}, phases.uniforms, phases.textures, (0, height), width)
         for owner in (target, make_map, phases):
             owner.release()
+        self._device = device
         self._pass = ScreenPass(device, "weave/nearest.frag", phases.constants)
+        constants = {**phases.constants, "PANEL_COLUMNS": width}
+        self._kernel = Kernel(device, "weave/nearest.comp", constants)
+        self._panel: TextureArray | None = None  # what the kernel stores to, where it is the faster
+
+    def choose(self, panel: TextureArray, framebuffer: LayerTarget) -> None:
+        """Fragments or compute, the faster here: fragments on software devices, where they take
+        0.7 of the time (docs/performance.md); elsewhere what a trial says."""
+        if self._device.info.software:
+            return
+        trial = TextureArray(self._device, "trial", (1, 1, 1), gl.RGBA8)
+        trial.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
+        images = ViewImages(trial, 0, (0, 0))
+        times = []
+        for target in (None, panel):
+            self._panel = target
+            framebuffer.use(0)
+            times.append(self._time(images, (0, panel.height), panel.width))
+        self._panel = panel if times[1] < times[0] else None
+        trial.release()
+
+    def _time(self, images: ViewImages, rows: tuple[int, int], width: int) -> float:
+        """Least of a few runs, in seconds."""
+        times = []
+        for _ in range(4):
+            self._device.finish()
+            start = time.perf_counter()
+            self(images, rows, width)
+            self._device.finish()
+            times.append(time.perf_counter() - start)
+        return min(times)
 
     def __call__(self, images: ViewImages, rows: tuple[int, int], width: int) -> None:
         samplers: Samplers = {"places": self._places, "view_images": images.images}
-        self._pass({}, {"first_row": images.first}, samplers, rows, width)
+        uniforms: dict[str, Uniform] = {"first_row": images.first}
+        if self._panel is None:
+            self._pass({}, uniforms, samplers, rows, width)
+            return
+        first, end = rows
+        self._panel.bind_image(0)
+        uniforms |= {"first_panel_row": first, "end_panel_row": end}
+        self._kernel.set({}, uniforms, samplers)
+        self._kernel.run((-(-width // 32), -(-(end - first) // 8), 1))
 
     def release(self) -> None:
         self._pass.release()
+        self._kernel.release()
         self._places.release()
 
 

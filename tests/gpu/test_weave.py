@@ -318,3 +318,22 @@ def test_filters_leave_no_seam_between_bands(
         np.testing.assert_array_equal(panel(), whole)
         patch.setattr(Reconstruction, "halo", property(lambda _: 0))  # the planted fault
         assert not np.array_equal(panel(), whole)
+
+
+def test_fragments_and_compute_weave_the_same(device: Device, rng: np.random.Generator) -> None:
+    profile = few_lenses(PAPER, 37.7, (322, 210))
+    grid = ViewGrid.lens(profile, 24)
+    target = ViewTarget(device, profile.rig(7), grid, [])
+    fill(device, target.images, rng.uniform(0.0, 1.0, (7, grid.rows, grid.columns, 3)))
+    step = Weave(device, profile, grid, 7)
+    step(target.bands[0])
+    by_fragments = step.read_linear()
+    clear = step.read_linear() * 0
+    step.panel.clear((0.0, 0.0, 0.0, 0.0))
+    np.testing.assert_array_equal(step.read_linear(), clear)
+    step._step._panel = step.panel  # compute from now on
+    step(target.bands[0])
+    np.testing.assert_array_equal(step.read_linear(), by_fragments)
+    assert by_fragments.min() < by_fragments.max()
+    step.release()
+    target.release()
