@@ -17,9 +17,9 @@ from lfd_render.reference import woven
 from lfd_render.reference.encode import encoded
 from lfd_render.renderer import Renderer, RenderOptions
 from lfd_render.renderer.plan import plan_panel
-from lfd_render.scene import Scene
+from lfd_render.scene import Material, Scene
 
-from .helpers import PAPER, few_lenses, fill
+from .helpers import PAPER, few_lenses, fill, mesh_of, millimetre_camera, scene_of
 
 pytestmark = pytest.mark.needs("gl")
 
@@ -81,6 +81,22 @@ def test_supersampled_views_are_means_of_fine_ones(
     assert np.abs(found.astype(int) - wanted)[dim].max() <= 2
     plain = renderer.views(scene, small, views=3, view_size=(40, 24), **options).astype(int)
     assert np.abs(found - plain).mean() > 0.5  # planted fault: not supersampled at all
+
+
+@pytest.mark.parametrize("options", [{}, {"technique": "mvr"}, {"projection": "general"}])
+def test_lenses_cut_off_by_the_window_are_sampled_whole(
+    renderer: Renderer, small: DisplayProfile, options: dict[str, Any]
+) -> None:
+    """A wall that fills the window fills the panel, however many samples a lens has."""
+    wall = scene_of(
+        mesh_of(np.array([[[-999, -999, 0], [999, -999, 0], [0, 1999, 0]]], float)),
+        materials=(Material("wall", (0.5, 0.5, 0.5, 1.0), unlit=True, double_sided=True),),
+    )
+    camera = millimetre_camera(small.size_mm)
+    eia = renderer.render(wall, small, camera, 6, supersample=(5, 1), **options)
+    # Half floats are cut; a sample of background in 25 would be seven levels.
+    assert np.ptp(eia.pixels.astype(int)) <= 1
+    assert eia.pixels.min() > 180
 
 
 def test_eyes_of_a_view_stay_in_its_interval() -> None:
