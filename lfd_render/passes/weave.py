@@ -20,6 +20,7 @@ from lfd_render.passes.view_target import Band, ViewImages
 NO_ROW = 0xFFFFFFFF
 MOST_INDEXED_VIEWS = 1 << 10  # what places.frag has bits for
 MOST_INDEXED_COLUMNS = 1 << 16
+_TRIAL_ROWS = 64  # of views, woven to find the faster way
 NEAREST = Reconstruction()
 
 
@@ -149,7 +150,7 @@ class _Nearest:
         make_map({}, phases.uniforms, phases.textures, (0, height), width)
         for owner in (target, make_map, phases):
             owner.release()
-        self._device = device
+        self._device, self._grid, self._views = device, grid, views
         self._pass = ScreenPass(device, "weave/nearest.frag", phases.constants)
         constants = {**phases.constants, "PANEL_COLUMNS": width}
         self._kernel = Kernel(device, "weave/nearest.comp", constants)
@@ -160,14 +161,18 @@ class _Nearest:
         0.7 of the time (docs/performance.md); elsewhere what a trial says."""
         if self._device.info.software:
             return
-        trial = TextureArray(self._device, "trial", (1, 1, 1), gl.RGBA8)
+        rows = min(_TRIAL_ROWS, self._grid.rows)
+        size = (self._grid.columns, rows, self._views)
+        trial = TextureArray(self._device, "trial", size, panel.internal_format)
         trial.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
-        images = ViewImages(trial, 0, (0, 0))
+        trial.clear((0.0, 0.0, 0.0, 0.0))
+        images = ViewImages(trial, 0, (0, rows))
+        panel_rows = (0, int(self._grid.first_panel_rows(panel.height)[rows]))
         times = []
         for target in (None, panel):
             self._panel = target
             framebuffer.use(0)
-            times.append(self._time(images, (0, panel.height), panel.width))
+            times.append(self._time(images, panel_rows, panel.width))
         self._panel = panel if times[1] < times[0] else None
         trial.release()
 
