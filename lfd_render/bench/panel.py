@@ -67,7 +67,8 @@ JPEG_QUALITY = 82
 @dataclasses.dataclass(frozen=True)
 class Study:
     """What is measured. compared: how many of the views, evenly chosen; frames: of a sweep, which
-    moves by `step` of a view interval each; gold_size: pixels of the gold standard's views."""
+    moves by `step` of a view interval each; gold_size: pixels of the gold standard's views;
+    crosstalk: σ of the virtual lenses' angular response, in views."""
 
     scene: str = SCENE
     compared: int = 3
@@ -76,6 +77,7 @@ class Study:
     step: float = 0.125
     gold_views: int = 96
     gold_size: tuple[int, int] | None = None
+    crosstalk: float = 0.0
     ways: tuple[str, ...] = tuple(WAYS)
 
 
@@ -127,8 +129,11 @@ class Eyes:
 
     def seen(self, eia: Pixels, eye_x_mm: NDArray[np.float64]) -> list[Pixels]:
         """What the virtual panel shows in their place."""
-        distance = self._display.distance_mm
-        return [look_from(eia, self._display, (float(x), 0.0, distance)) for x in eye_x_mm]
+        distance, sigma = self._display.distance_mm, self._study.crosstalk
+        return [
+            look_from(eia, self._display, (float(x), 0.0, distance), sigma_views=sigma)
+            for x in eye_x_mm
+        ]
 
 
 def measure(
@@ -224,6 +229,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--step", type=float, default=Study.step)
     parser.add_argument("--gold-views", type=int, default=Study.gold_views)
     parser.add_argument("--gold-size", type=int, nargs=2, metavar=("WIDTH", "HEIGHT"))
+    parser.add_argument("--crosstalk", type=float, default=Study.crosstalk, metavar="VIEWS")
     parser.add_argument("--ways", nargs="+", choices=list(WAYS), default=list(WAYS))
     parser.add_argument("--pictures", type=Path, metavar="FOLDER")
     parser.add_argument("--json", action="store_true", help="print one JSON object")

@@ -30,6 +30,12 @@ class ViewPlan:
         return self.rig.views // self.eyes
 
     @property
+    def rows_follow_views(self) -> bool:
+        """Whether all views together hold as many pixels as the panel, as the display drives them:
+        not where angles or pixels are finer than that."""
+        return self.rule.view == 1.0 and self.rule.samples != GOLD_SAMPLES
+
+    @property
     def times(self) -> int:
         """How many rendered rows and columns are averaged to one of the views."""
         return self.rendered.rows // self.grid.rows

@@ -157,8 +157,8 @@ class Renderer:
         metadata = {
             "lfd:profile": display.name,
             "lfd:profile-hash": display.hash,
-            # As many as make the rows of the views; of continuous ones, the display's.
-            "lfd:views": str(display.views if choice.views == "continuous" else plan.views),
+            # As many as `look` takes rows for: where views are more than rows allow, the display's.
+            "lfd:views": str(plan.views if plan.rows_follow_views else display.views),
             "lfd:technique": choice.technique,
             "lfd:seed": str(choice.seed),
         }

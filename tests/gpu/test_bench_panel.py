@@ -19,7 +19,7 @@ def test_finer_angles_lower_the_error_of_a_sweep(device: Device, tmp_path: Path)
     lens = few_lenses(PAPER, 60.1, (480, 270))
     display = lens.model_copy(update={"viewing": lens.viewing.model_copy(update={"views": 12})})
     study = Study(
-        scene="builtin:gallery?triangles=2000", compared=1, samples=2, frames=9, gold_views=8,
+        scene="builtin:gallery?triangles=2000", compared=1, samples=2, frames=5, gold_views=8,
         gold_size=(240, 136), ways=("none", "both", "continuous"),
     )  # fmt: skip
     with Renderer(device) as renderer:
