@@ -3,14 +3,14 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from lfd_render.version import __version__
+
 if TYPE_CHECKING:
     from lfd_render.display import Camera, DisplayProfile
     from lfd_render.panel.eia import Eia
     from lfd_render.panel.look import look
     from lfd_render.renderer import Renderer
     from lfd_render.scene import Environment, Scene
-
-__version__ = "0.1.0"
 
 __all__ = [
     "Camera",

@@ -82,6 +82,14 @@ class ShadePlace(StrEnum):
     POINT = "point"
 
 
+class Format(StrEnum):
+    """What kind of file a panel image becomes."""
+
+    PNG = "png"
+    EXR = "exr"
+    RAW = "raw"
+
+
 class Spacing(StrEnum):
     """Rule by which the eyes of the views stand."""
 
@@ -237,6 +245,13 @@ EnvironmentTurnOption = Annotated[
 ]
 EnvironmentIntensityOption = Annotated[
     float, typer.Option(metavar="F", help="Scale the environment's light.")
+]
+FormatOption = Annotated[
+    Format | None,
+    typer.Option(
+        help="png: sRGB; exr: scene-linear half floats, before exposure; raw: sRGB bytes, row by "
+        "row, beside a .json. Else by the file's name; png to stdout."
+    ),
 ]
 LodOption = Annotated[
     Lod | None,

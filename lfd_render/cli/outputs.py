@@ -4,7 +4,7 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -12,11 +12,13 @@ from lfd_render.cli.console import writing_stdout
 from lfd_render.errors import OutputError, UsageError
 
 STDOUT = "-"
-PICTURE_SUFFIXES = (".png",)
 
 
-def check_picture_output(output: str, json: bool = False) -> None:
-    """Raise before work starts if a picture cannot be written to this file, or to stdout.
+def check_picture_output(
+    output: str, json: bool = False, formats: Sequence[str] = ("png",), asked: str | None = None
+) -> str:
+    """The format of a picture that goes to this file, or to stdout: the one asked for, else what
+    the name ends in, else the first. Raises before work starts if it cannot be written there.
 
     OutputError for a place that cannot be written, UsageError for a name that makes no sense.
     """
@@ -25,14 +27,18 @@ def check_picture_output(output: str, json: bool = False) -> None:
             raise UsageError("-o -: stdout carries either the picture or --json's object; drop one")
         if sys.stdout.isatty():
             raise UsageError("-o -: stdout is a terminal; send the picture to a file or a pipe")
-        return
+        return asked or formats[0]
     path = Path(output)
     if path.is_dir():
         raise OutputError(f"{output}: is a folder; give a file name")
-    if path.suffix.lower() not in PICTURE_SUFFIXES:
-        known = " or ".join(PICTURE_SUFFIXES)
+    if path.exists() and not path.is_file():
+        raise OutputError(f"{output}: is a device or a pipe; give a file name, or - for stdout")
+    named = path.suffix.lower()[1:]
+    if asked is None and named not in formats:
+        known = " or ".join(f".{name}" for name in formats)
         raise UsageError(f"{output}: suffix '{path.suffix}'; give {known}, or - for stdout")
     _check_folder(path.parent)
+    return asked or named
 
 
 def check_folder_output(output: str) -> Path:
@@ -91,7 +97,7 @@ def write_picture(output: str, save: Callable[[Path], object]) -> None:
         save(Path(output))
         return
     with tempfile.TemporaryDirectory(prefix="lfd-render-") as folder:
-        file = Path(folder) / f"picture{PICTURE_SUFFIXES[0]}"
+        file = Path(folder) / "picture"
         save(file)
         with file.open("rb") as picture, writing_stdout():
             shutil.copyfileobj(picture, sys.stdout.buffer)

@@ -20,8 +20,12 @@ def render(
     scene: options.SceneArgument,
     *,
     output: Annotated[
-        str, typer.Option("--output", "-o", metavar="FILE", help="PNG to write; - for stdout.")
+        str,
+        typer.Option(
+            "--output", "-o", metavar="FILE", help=".png, .exr or .raw to write; - for stdout."
+        ),
     ],
+    format: options.FormatOption = None,
     display: options.DisplayOption = options.DEFAULT_DISPLAY,
     views: options.ViewsOption = None,
     view_size: options.ViewSizeOption = None,
@@ -55,7 +59,7 @@ def render(
     """Render SCENE into the panel image (EIA) of a display."""
     size = options.parse_view_size(view_size)
     options.check_device(device)
-    check_picture_output(output, json)
+    kind = check_picture_output(output, json, list(options.Format), format)
 
     watch = Stopwatch()
     with watch.span("load"), progress("Loading"):
@@ -104,7 +108,7 @@ def render(
             **light,
         )
     with watch.span("encode"), progress("Writing"):
-        write_picture(output, eia.save)
+        write_picture(output, lambda file: eia.save(file, kind))
 
     for warning in eia.report["warnings"]:
         if warning not in loaded.warnings:  # those were said when it was loaded

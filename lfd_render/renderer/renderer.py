@@ -17,7 +17,7 @@ from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.lighting import EnvironmentMap
 from lfd_render.gpu.scene_buffers import SceneBuffers
-from lfd_render.panel.eia import Eia
+from lfd_render.panel.eia import Eia, eia_metadata
 from lfd_render.passes.encode import Encode
 from lfd_render.passes.placement import Placement
 from lfd_render.passes.prefilter import Prefilter
@@ -130,13 +130,16 @@ class Renderer:
         frames.release()
         if choice.technique == "lfdpr" and report["points"] == 0:
             report["warnings"].append("nothing of the scene can be seen through the window")
-        metadata = {
-            "lfd:profile": display.name,
-            "lfd:profile-hash": display.hash,
-            "lfd:views": str(rig.views),
-            "lfd:technique": choice.technique,
-            "lfd:seed": str(choice.seed),
-        }
+        metadata = eia_metadata(
+            display,
+            rig.views,
+            grid,
+            technique=choice.technique,
+            preset=choice.preset,
+            lod=choice.lod_rule,
+            seed=choice.seed,
+            exposure=choice.exposure,
+        )
         return Eia(pixels, linear, report, metadata)
 
     def views(
