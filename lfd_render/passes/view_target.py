@@ -36,10 +36,20 @@ class Band:
 
 
 class ViewTarget:
-    """Rig, grid and bands, with the view images [view, row of the band, column] in linear light."""
+    """Rig, grid and bands, with the view images [view, row of the band, column] in linear light.
+
+    Pictures that are only woven come without batches, and may have a format of their own.
+    """
 
     def __init__(
-        self, device: Device, rig: Rig, grid: ViewGrid, batches: Sequence[Batch], seed: int = 0
+        self,
+        device: Device,
+        rig: Rig,
+        grid: ViewGrid,
+        batches: Sequence[Batch] = (),
+        seed: int = 0,
+        *,
+        image_format: int = gl.RGBA16F,
     ) -> None:
         self.rig = rig
         self.grid = grid
@@ -59,15 +69,14 @@ class ViewTarget:
         self.eyes = Buffer.of(device, "rig", (rig.eye_x_mm / grid.column_mm).astype(np.float32))
         self.row_offsets = Buffer.of(device, "rig", grid.row_offset.astype(np.float32))
         self.images = TextureArray(
-            device, "view images", (grid.columns, self.band_rows, rig.views), gl.RGBA16F
+            device, "view images", (grid.columns, self.band_rows, rig.views), image_format
         )
         self.images.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
+        triangles = [(batch.triangles, batch.triangle_base) for batch in batches] or [(0, 0)]
         self.frame_blocks = {
-            (band, batch.triangle_base): Buffer.of(
-                device, "frame", _frame_record(band, batch, seed)
-            )
+            (band, base): Buffer.of(device, "frame", _frame_record(band, count, base, seed))
             for band in (*self.bands, self.warm_up_band)
-            for batch in batches
+            for count, base in triangles
         }
 
     @property
@@ -82,7 +91,9 @@ class ViewTarget:
         self.images.release()
 
 
-def _frame_record(band: Band, batch: Batch, seed: int) -> np.ndarray[tuple[int], np.dtype[np.void]]:
+def _frame_record(
+    band: Band, triangles: int, triangle_base: int, seed: int
+) -> np.ndarray[tuple[int], np.dtype[np.void]]:
     rig, grid = band.target.rig, band.target.grid
     record = np.zeros(1, dtype("Frame"))
     width, height = rig.panel_mm
@@ -95,6 +106,6 @@ def _frame_record(band: Band, batch: Batch, seed: int) -> np.ndarray[tuple[int],
     record["eye_last"] = rig.eye_x_mm[-1] / grid.column_mm
     record["columns"], record["rows"], record["views"] = grid.columns, grid.rows, rig.views
     record["band_first"], record["band_rows"] = band.first, band.rows
-    record["triangles"], record["triangle_base"] = batch.triangles, batch.triangle_base
+    record["triangles"], record["triangle_base"] = triangles, triangle_base
     record["seed"] = seed & 0xFFFFFFFF
     return record
