@@ -100,12 +100,22 @@ class Spacing(StrEnum):
 
 def parse_view_size(text: str | None) -> tuple[int, int] | None:
     """Columns and rows of ``480x360``; None stays None. Raises UsageError."""
+    return parse_size("--view-size", text)
+
+
+def parse_size(option: str, text: str | None, example: str = "480x360") -> tuple[int, int] | None:
+    """The two numbers of an option's ``480x360``; None stays None. Raises UsageError."""
     if text is None:
         return None
     match = re.fullmatch(r"([1-9]\d{0,5})[x×]([1-9]\d{0,5})", text.strip().lower())
     if not match:
-        raise UsageError(f"--view-size: '{text}'; give columns x rows, as 480x360")
+        raise UsageError(f"{option}: '{text}'; give columns x rows, as {example}")
     return int(match[1]), int(match[2])
+
+
+def parse_tiles(text: str | None) -> tuple[int, int] | None:
+    """Columns and rows of ``8x6``; None stays None. Raises UsageError."""
+    return parse_size("--tiles", text, "8x6")
 
 
 def check_device(text: str) -> str:
@@ -252,6 +262,10 @@ FormatOption = Annotated[
         help="png: sRGB; exr: scene-linear half floats, before exposure; raw: sRGB bytes, row by "
         "row, beside a .json. Else by the file's name; png to stdout."
     ),
+]
+TilesOption = Annotated[
+    str | None,
+    typer.Option(metavar="CxR", help="Columns and rows of the quilt, as 8x6."),
 ]
 LodOption = Annotated[
     Lod | None,

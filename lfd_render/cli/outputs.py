@@ -1,6 +1,7 @@
 """Where results go: checked before any rendering, written whole or not at all."""
 
 import os
+import re
 import shutil
 import sys
 import tempfile
@@ -8,10 +9,11 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from lfd_render.cli.console import writing_stdout
+from lfd_render.cli.console import warn, writing_stdout
 from lfd_render.errors import OutputError, UsageError
 
 STDOUT = "-"
+_VIEW_NAME = re.compile(r"view_\d{3,}\.png")
 
 
 def check_picture_output(
@@ -82,6 +84,16 @@ def filling(folder: Path) -> Iterator[Path]:
         if isinstance(error, OSError):
             raise OutputError(f"{folder}: {error.strerror}; choose another folder") from error
         raise
+
+
+def remove_others(folder: Path, written: Sequence[Path]) -> None:
+    """Remove views of an earlier run, which are not among those written, and say so."""
+    views = [file for file in folder.iterdir() if _VIEW_NAME.fullmatch(file.name)]
+    older = [file for file in views if file not in written]
+    for file in older:
+        file.unlink(missing_ok=True)
+    if older:
+        warn(f"{folder}: {len(older)} views of an earlier run, with more views, are removed")
 
 
 def _remove_empty(folder: Path) -> None:

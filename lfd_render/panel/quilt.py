@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lfd_render.display import DisplayProfile
 from lfd_render.errors import PictureError, UsageError
 from lfd_render.panel.picture import read_picture_file, write_png
 from lfd_render.panel.quilt_names import (
@@ -20,12 +21,12 @@ from lfd_render.panel.quilt_names import (
     QuiltLayout,
     comment_exif,
     layout_of,
-    name_suffix,
-    named_layout,
+    named_path,
     stored_text,
 )
 
 MAX_TILES = 1024  # as many views as a renderer makes
+_STRETCHED = 0.02  # more than this shows
 _MOST_STRETCH = 2.0  # of view pixels, beyond the 1.78 of vendors' presets
 
 
@@ -67,8 +68,9 @@ PRESETS = {
 class Quilt:
     """Views uint8 [view, y, x, 3], view 0 leftmost, in columns × rows tiles.
 
-    aspect: width of a view for its height, as shown; None: that of its pixels. size_px: width and
+    aspect: width of a view for its height, as shown; 0: that of its pixels. size_px: width and
     height of the picture, by default those of the tiles. metadata: what its file carries besides.
+    warnings: what a person should know of its file.
     Raises UsageError for numbers that fit no quilt.
     """
 
@@ -78,6 +80,7 @@ class Quilt:
     aspect: float = 0.0
     size_px: tuple[int, int] = (0, 0)
     metadata: dict[str, str] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Check, and fill in what was left out."""
@@ -119,6 +122,16 @@ class Quilt:
         picture[self.size_px[1] - self.rows * height :, : self.columns * width] = tiled
         return picture
 
+    def misfits(self, display: DisplayProfile, source: str = "quilt") -> list[str]:
+        """What does not suit a display, one sentence each: views of another aspect."""
+        wanted = display.size_mm[0] / display.size_mm[1]
+        if abs(self.aspect / wanted - 1) <= _STRETCHED:
+            return []
+        return [
+            f"{source}: its views have aspect {self.aspect:.4g}, the display '{display.name}' "
+            f"{wanted:.4g}; they are stretched"
+        ]
+
     @staticmethod
     def from_pixels(
         pixels: NDArray[np.uint8], columns: int, rows: int, aspect: float = 0.0
@@ -133,14 +146,7 @@ class Quilt:
 
     def path(self, path: str | Path) -> Path:
         """The file's name with the tiling in it. Raises UsageError where it names another."""
-        path = Path(path)
-        named = named_layout(path)
-        if named and not named.agrees(self.layout):
-            raise UsageError(f"{path}: names {named}, but the quilt has {self.layout}")
-        if named:
-            return path
-        stem = path.stem if path.suffix.lower() == ".png" else path.name
-        return path.with_name(f"{stem}{name_suffix(self.layout)}.png")
+        return named_path(path, self.layout)
 
     def save(self, path: str | Path) -> Path:
         """Write a PNG under the convention's name, and give that name back.
@@ -172,8 +178,15 @@ class Quilt:
         size = QuiltSize(layout.columns, layout.rows, width, height)
         _check_size(path, size, layout, own=STORED_KEYS[0] in file.text or bool(tiles))
         quilt = Quilt.from_pixels(file.pixels, size.columns, size.rows, layout.aspect or 0.0)
+        warnings = (
+            (f"{path}: is a JPEG, whose chroma subsampling blurs colours; a PNG weaves sharper",)
+            if file.kind == "JPEG"
+            else ()
+        )
         text = {key: value for key, value in file.text.items() if key not in STORED_KEYS}
-        return Quilt(quilt.views, quilt.columns, quilt.rows, quilt.aspect, quilt.size_px, text)
+        return Quilt(
+            quilt.views, quilt.columns, quilt.rows, quilt.aspect, quilt.size_px, text, warnings
+        )
 
 
 def _check_size(path: Path, size: QuiltSize, layout: QuiltLayout, *, own: bool) -> None:

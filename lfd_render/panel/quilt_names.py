@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from PIL import ExifTags, Image
 
-from lfd_render.errors import PictureError
+from lfd_render.errors import PictureError, UsageError
 from lfd_render.panel.picture import PictureFile
 
 STORED_KEYS = ("lfd:quilt-tiles", "lfd:quilt-aspect")
@@ -73,10 +73,17 @@ def named_layout(path: Path) -> QuiltLayout | None:
     return QuiltLayout(int(match[1]), int(match[2]), float(match[3]) or None) if match else None
 
 
-def name_suffix(layout: QuiltLayout) -> str:
-    """What a file's name gets before its extension."""
+def named_path(path: str | Path, layout: QuiltLayout) -> Path:
+    """A file's name with the tiling in it. Raises UsageError where it names another."""
+    path = Path(path)
+    named = named_layout(path)
+    if named and not named.agrees(layout):
+        raise UsageError(f"{path}: names {named}, but the quilt has {layout}")
+    if named:
+        return path
+    stem = path.stem if path.suffix.lower() == ".png" else path.name
     aspect = f"{layout.aspect:.5f}".rstrip("0").rstrip(".")
-    return f"_qs{layout.columns}x{layout.rows}a{aspect}"
+    return path.with_name(f"{stem}_qs{layout.columns}x{layout.rows}a{aspect}.png")
 
 
 def stored_text(layout: QuiltLayout) -> dict[str, str]:

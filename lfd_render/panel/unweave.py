@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.display import DisplayProfile, ViewGrid
+from lfd_render.display.model import MAX_VIEWS
 from lfd_render.errors import PictureError, UsageError
 
 Pixels = NDArray[np.uint8]
@@ -59,6 +60,8 @@ def unweave(
             f"uint8 [{height}, {width}, 3]"
         )
     count = profile.views if views is None else views
+    if not 1 <= count <= MAX_VIEWS:
+        raise UsageError(f"views is {count}; it should be from 1 to {MAX_VIEWS}")
     if rows is not None and not 1 <= rows <= height:
         raise UsageError(f"rows: {rows} is out of range; use 1 to {height}, the panel's own")
     few = rows or ViewGrid.default_rows(profile, count)
@@ -73,6 +76,25 @@ def unweave(
     return Unwoven(pictures, fine.grid, float(known.mean()), collisions)
 
 
+def unwoven_grid(profile: DisplayProfile, views: int, rows: int) -> ViewGrid:
+    """The lens-aligned grid of so many rows, with columns for all lenses that some subpixel of a
+    row lies under, also where a cell reaches beyond the panel's edge."""
+    grid = ViewGrid.lens(profile, rows)
+    width, height = profile.resolution_px
+    edges = np.unique(np.clip([*range(_EDGE_PX), *range(width - _EDGE_PX, width)], 0, width - 1))
+    _, lens = _looked_up(profile, views, edges, np.arange(height))
+    starts = grid.first_panel_rows(height)[:-1]
+    first = np.minimum.reduceat(lens.min(axis=(1, 2)), starts)
+    last = np.maximum.reduceat(lens.max(axis=(1, 2)), starts)
+    base = np.minimum(first, grid.row_base)
+    return replace(
+        grid,
+        columns=max(grid.columns, int((last - base).max()) + 1),
+        row_base=base.astype(np.int32),
+        row_offset=grid.row_offset + (grid.row_base - base),
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class _Sampling:
     """Which view pixel each subpixel is looked up in: exactly that of the weave pass."""
@@ -83,25 +105,8 @@ class _Sampling:
 
     @staticmethod
     def of(profile: DisplayProfile, views: int, rows: int) -> _Sampling:
-        """On the lens-aligned grid of so many rows, with columns for all lenses that some subpixel
-        of a row lies under, also where a cell reaches beyond the panel's edge."""
-        grid = ViewGrid.lens(profile, rows)
-        width, height = profile.resolution_px
-        edges = np.unique(
-            np.clip([*range(_EDGE_PX), *range(width - _EDGE_PX, width)], 0, width - 1)
-        )
-        _, lens = _looked_up(profile, views, edges, np.arange(height))
-        starts = grid.first_panel_rows(height)[:-1]
-        first = np.minimum.reduceat(lens.min(axis=(1, 2)), starts)
-        last = np.maximum.reduceat(lens.max(axis=(1, 2)), starts)
-        base = np.minimum(first, grid.row_base)
-        wider = replace(
-            grid,
-            columns=max(grid.columns, int((last - base).max()) + 1),
-            row_base=base.astype(np.int32),
-            row_offset=grid.row_offset + (grid.row_base - base),
-        )
-        return _Sampling(profile, wider, views)
+        """On the grid of so many rows."""
+        return _Sampling(profile, unwoven_grid(profile, views, rows), views)
 
     def places(self) -> Iterator[tuple[slice, tuple[Index, ...]]]:
         """Panel rows of a block of whole view rows, and the index of their subpixels into views

@@ -18,6 +18,9 @@ from lfd_render.gpu.device import Device
 from lfd_render.gpu.lighting import EnvironmentMap
 from lfd_render.gpu.scene_buffers import SceneBuffers
 from lfd_render.panel.eia import Eia, eia_metadata
+from lfd_render.panel.quilt import Quilt
+from lfd_render.panel.unweave import Unwoven
+from lfd_render.panel.weaving import check_views, weave_pictures
 from lfd_render.passes.encode import Encode
 from lfd_render.passes.placement import Placement
 from lfd_render.passes.prefilter import Prefilter
@@ -193,6 +196,47 @@ class Renderer:
         technique.release()
         encode.release()
         return pictures
+
+    def weave(
+        self,
+        views: NDArray[np.uint8] | Quilt | Unwoven,
+        display: DisplayProfile,
+        grid: ViewGrid | None = None,
+    ) -> Eia:
+        """Weave pictures of views into the panel image of a display: a quilt, unwoven views, or
+        uint8 [view, y, x, 3] in sRGB, view 0 leftmost, upright unless `grid` says otherwise.
+
+        Between columns of upright views light is mixed; views that follow the lenses keep their
+        very codes. Raises UsageError for arrays that are no views, ResourceError or GpuError.
+        """
+        if not isinstance(display, DisplayProfile):
+            raise UsageError(f"display: {display!r}; give a DisplayProfile, as its load(…) makes")
+        if isinstance(views, Unwoven):
+            grid = views.grid
+        pictures = views if isinstance(views, np.ndarray) else views.views
+        if pictures.ndim != 4:
+            raise UsageError(f"views: shape {list(pictures.shape)}; give uint8 [view, y, x, 3]")
+        grid = grid or ViewGrid.upright(display, pictures.shape[2], pictures.shape[1])
+        check_views(pictures, grid)
+        count = len(pictures)
+        _check_size(grid, count)
+        timings = Timings()
+        with self._call():
+            pixels, linear = timings.measure(
+                "weave",
+                self.device,
+                lambda: weave_pictures(self.device, pictures, display, grid),
+            )
+        report = {
+            "views": count,
+            "view_size": [grid.columns, grid.rows],
+            "view_grid": grid.kind,
+            "renderer": self.device.name,
+            "device_bytes": self.device.ledger.peak,
+            "warnings": [],
+            "timings_ms": timings.summary(),
+        }
+        return Eia(pixels, linear, report, eia_metadata(display, count, grid, technique="weave"))
 
     @contextmanager
     def _call(self) -> Iterator[None]:
