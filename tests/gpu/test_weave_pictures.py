@@ -146,14 +146,16 @@ def test_a_quilt_of_a_scene_is_its_panel_image(renderer: Renderer) -> None:
     """As good as 8 bits and a tone curve before the mixing of columns let it be."""
     profile = few_lenses("looking-glass-portrait-sample-a", 61.7, (384, 512))
     scene = Scene.load("builtin:gallery?triangles=20000")
-    direct = renderer.render(scene, profile, views=24, view_size=(60, 80)).pixels.astype(int)
-    views = renderer.views(scene, profile, views=24, view_size=(60, 80))
+    options = {"views": 24, "view_size": (60, 80), "exposure": 0.2}
+    direct = renderer.render(scene, profile, **options).pixels.astype(int)
+    views = renderer.views(scene, profile, **options)
     apart = np.abs(renderer.weave(Quilt(views, 6, 4), profile).pixels - direct)
-    # Light above 0.8 is mixed before the curve in one, after it in the other: 0.7 % of subpixels.
-    assert apart.mean() < 0.5
-    assert (apart > 1).mean() < 0.02
+    # The edges of lamps, brighter than 0.8, are mixed before the curve in one and after it in the
+    # other: 0.4 % of subpixels. The rest differs by the rounding of views to 8 bits.
+    assert apart.mean() < 0.35
+    assert (apart > 1).mean() < 0.01
     mirrored = renderer.weave(views[::-1].copy(), profile).pixels
-    assert np.abs(mirrored - direct).mean() > 5  # control: views in reverse order
+    assert np.abs(mirrored - direct).mean() > 3  # control: views in reverse order
 
 
 def linear_from_srgb(codes: Codes) -> NDArray[np.float64]:
