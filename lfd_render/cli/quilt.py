@@ -161,7 +161,7 @@ def _quilt_size(
 ) -> QuiltSize:
     """Tiles and pixels as asked for, else as the display's own views ask. Raises UsageError."""
     from lfd_render.panel.quilt import MAX_TILES, PRESETS, QuiltSize  # noqa: PLC0415
-    from lfd_render.renderer.renderer import upright_size  # noqa: PLC0415
+    from lfd_render.renderer import upright_size  # noqa: PLC0415
 
     if preset is not None:
         if tiles or pixels:

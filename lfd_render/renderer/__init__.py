@@ -1,6 +1,6 @@
 """The renderer: one device, any scene, any display."""
 
 from lfd_render.renderer.options import RenderOptions
-from lfd_render.renderer.renderer import Renderer, camera_for
+from lfd_render.renderer.renderer import Renderer, camera_for, upright_size
 
-__all__ = ["RenderOptions", "Renderer", "camera_for"]
+__all__ = ["RenderOptions", "Renderer", "camera_for", "upright_size"]

@@ -219,7 +219,6 @@ class Renderer:
         grid = grid or ViewGrid.upright(display, pictures.shape[2], pictures.shape[1])
         check_views(pictures, grid)
         count = len(pictures)
-        _check_size(grid, count)
         timings = Timings()
         with self._call():
             pixels, linear = timings.measure(
