@@ -110,7 +110,15 @@ def views(
             **light,
         )
     with watch.span("encode"), progress("Writing"):
-        files = _write(folder, pictures)
+        text = {
+            "lfd:profile": profile.name,
+            "lfd:profile-hash": profile.hash,
+            "lfd:views": str(len(pictures)),
+            "lfd:technique": technique.value,
+            "lfd:preset": preset.value,
+            "lfd:seed": str(seed),
+        }
+        files = _write(folder, pictures, text)
 
     if json:
         print_json(
@@ -130,8 +138,8 @@ def views(
     say(f"{folder}: {len(files)} views of {pictures.shape[2]} × {pictures.shape[1]}")
 
 
-def _write(folder: Path, pictures: NDArray[np.uint8]) -> list[Path]:
-    """Write uint8 [view, y, x, 3] as view_000.png and so on; the files in view order.
+def _write(folder: Path, pictures: NDArray[np.uint8], text: dict[str, str]) -> list[Path]:
+    """Write uint8 [view, y, x, 3] as view_000.png and so on, with text; the files in view order.
 
     All appear or none, in the place of all views of an earlier run.
     """
@@ -139,8 +147,8 @@ def _write(folder: Path, pictures: NDArray[np.uint8]) -> list[Path]:
 
     names = [f"view_{index:03d}.png" for index in range(len(pictures))]
     with filling(folder) as temporary:
-        for name, pixels in zip(names, pictures, strict=True):
-            write_png(temporary / name, pixels)
+        for index, (name, pixels) in enumerate(zip(names, pictures, strict=True)):
+            write_png(temporary / name, pixels, text | {"lfd:view": str(index)})
     files = [folder / name for name in names]
     remove_others(folder, files)
     return files

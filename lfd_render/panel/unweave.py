@@ -64,13 +64,13 @@ def unweave(
         raise UsageError(f"views is {count}; it should be from 1 to {MAX_VIEWS}")
     if rows is not None and not 1 <= rows <= height:
         raise UsageError(f"rows: {rows} is out of range; use 1 to {height}, the panel's own")
-    few = rows or ViewGrid.default_rows(profile, count)
-    coarse = _Sampling.of(profile, count, few)
+    few = ViewGrid.default_rows(profile, count)
+    coarse = _Sampling.of(profile, count, min(few, rows or few))
     pictures, known, collisions = coarse.scattered(eia)
     filled = _filled(pictures, known)
-    if not collisions or rows is not None:
+    if rows == coarse.grid.rows or (rows is None and not collisions):
         return Unwoven(filled, coarse.grid, float(known.mean()), collisions)
-    fine = _Sampling.of(profile, count, height)
+    fine = _Sampling.of(profile, count, rows or height)
     pictures, known, collisions = fine.scattered(eia)
     _take_unknown(pictures, known, fine.grid, filled, coarse.grid)
     return Unwoven(pictures, fine.grid, float(known.mean()), collisions)

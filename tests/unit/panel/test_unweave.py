@@ -77,6 +77,18 @@ def test_colliding_subpixels_are_counted_where_rows_are_asked_for() -> None:
     assert np.count_nonzero(again != noise()) == found.collisions > 0
 
 
+@pytest.mark.parametrize("rows", [1, 5, 40, 63, 64])
+def test_any_number_of_rows_may_be_asked_for(rows: int) -> None:
+    """Beyond the default rows most view pixels are not in the panel image; none is left out."""
+    ramp = (77 + np.arange(SIZE[1])).astype(np.uint8)[:, None, None]
+    found = unweave(np.broadcast_to(ramp, (SIZE[1], SIZE[0], 3)), small(), 9, rows)
+    assert found.grid.rows == rows
+    assert found.views.min() >= 77
+    across = found.views.mean(axis=(0, 2, 3))
+    # Row by row the panel rows it stands for, or those around.
+    assert np.abs(across - (77 + (np.arange(rows) + 0.5) * 64 / rows)).max() < max(8, 34 / rows)
+
+
 def test_too_few_views_collide() -> None:
     found = unweave(noise(), small(), 4)  # a pixel is half a view wide
     assert found.grid.rows == SIZE[1]
