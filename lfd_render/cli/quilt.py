@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from lfd_render.display import DisplayProfile
     from lfd_render.panel.quilt import QuiltSize
 
+_OTHER_KINDS = (".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".bmp", ".exr", ".raw")
+
 
 def quilt(
     scene: options.SceneArgument,
@@ -67,7 +69,10 @@ def quilt(
     tiling = options.parse_tiles(tiles)
     pixels = options.parse_size("--size", size)
     options.check_device(device)
-    if output != STDOUT and Path(output).suffix.lower() != ".png":
+    suffix = Path(output).suffix.lower()
+    if suffix in _OTHER_KINDS:
+        raise UsageError(f"{output}: suffix '{suffix}'; a quilt is written as .png")
+    if output != STDOUT and suffix != ".png":
         output += ".png"
     check_picture_output(output, json)
 

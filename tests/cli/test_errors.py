@@ -101,6 +101,7 @@ def test_debug_shows_the_traceback(
             "99x99 does not divide",
         ),
         (("quilt", "x.glb", "-o", "a_qs5x9a1.777.png"), "a_qs5x9a1.777.png: names 5 x 9 views"),
+        (("quilt", "x.glb", "-o", "a.jpg"), "a quilt is written as .png"),
         (("weave", "x.png"), "--output"),
         (("weave", "x.png", "-o", "a.tif"), ".png or .exr or .raw"),
         (("weave", "x.png", "-o", "a.png", "--tiles", "x"), "--tiles"),
