@@ -3,24 +3,28 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from lfd_render.version import __version__
+
 if TYPE_CHECKING:
     from lfd_render.display import Camera, DisplayProfile
     from lfd_render.panel.eia import Eia
     from lfd_render.panel.look import look
+    from lfd_render.panel.quilt import Quilt
+    from lfd_render.panel.unweave import unweave
     from lfd_render.renderer import Renderer
     from lfd_render.scene import Environment, Scene
-
-__version__ = "0.1.0"
 
 __all__ = [
     "Camera",
     "DisplayProfile",
     "Eia",
     "Environment",
+    "Quilt",
     "Renderer",
     "Scene",
     "__version__",
     "look",
+    "unweave",
 ]
 
 # Loaded when first used, so that the command line answers --help without numpy or OpenGL.
@@ -29,9 +33,11 @@ _HOMES = {
     "DisplayProfile": "lfd_render.display",
     "Eia": "lfd_render.panel.eia",
     "Environment": "lfd_render.scene",
+    "Quilt": "lfd_render.panel.quilt",
     "Renderer": "lfd_render.renderer",
     "Scene": "lfd_render.scene",
     "look": "lfd_render.panel.look",
+    "unweave": "lfd_render.panel.unweave",
 }
 
 

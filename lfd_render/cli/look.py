@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from lfd_render.cli import options
-from lfd_render.cli.console import Stopwatch, print_json, progress, say, warn
+from lfd_render.cli.console import Stopwatch, print_json, progress, say
 from lfd_render.cli.eyes import stands
-from lfd_render.cli.inputs import display_warnings, load_display
+from lfd_render.cli.inputs import display_warnings, load_display, load_eia
 from lfd_render.cli.outputs import (
     STDOUT,
     check_folder_output,
@@ -20,13 +19,6 @@ from lfd_render.cli.outputs import (
     filling,
     write_picture,
 )
-from lfd_render.errors import PictureError
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from lfd_render.display import DisplayProfile
 
 EYES_APART_MM = 64.0
 
@@ -108,13 +100,13 @@ def look(
     with watch.span("load"):
         profile = load_display(display)
         places = stands(profile, angle, eye, sweep)
-        pixels, woven = _read_panel_image(eia, profile)
+        panel = load_eia(eia, profile)
     with watch.span("look"), progress("Looking"):
         seen = [
             side_by_side(
                 [
                     look_from(
-                        pixels, profile, at, views or woven, size,
+                        panel.pixels, profile, at, views or panel.views, size,
                         sigma_views=crosstalk, optics=optics.value,
                     )
                     for at in place.eyes(eyes_apart if stereo else None)
@@ -139,31 +131,10 @@ def look(
             "display": profile.name,
             "eyes_mm": [place.eyes(eyes_apart if stereo else None) for place in places],
             "view_size": [width, height],
-            "warnings": display_warnings(profile),
+            "warnings": [*display_warnings(profile), *panel.warnings],
             "timings_ms": watch.finish(),
         }
         print_json(result if angle is None else result | {"angle_deg": angle})
     said = places[0].said if len(places) == 1 else f"{places[0].said} to {places[-1].said}"
     pictures = "" if len(seen) == 1 else f"{len(seen)} pictures of "
     say(f"{output}: {pictures}{width} × {height}, seen from {said}")
-
-
-def _read_panel_image(eia: str, profile: DisplayProfile) -> tuple[NDArray[np.uint8], int | None]:
-    """Pixels, uint8 [y, x, 3], and the number of views woven in where the file says it.
-
-    Raises PictureError for a file that is no picture of the display's size.
-    """
-    from lfd_render.panel.picture import read_picture, read_png_text  # noqa: PLC0415
-
-    pixels, text = read_picture(eia), read_png_text(eia)
-    made_for = text.get("lfd:profile", "an unnamed display")
-    width, height = profile.resolution_px
-    if pixels.shape[:2] != (height, width):
-        raise PictureError(
-            f"{eia}: {pixels.shape[1]} x {pixels.shape[0]} pixels, made for {made_for}; "
-            f"the display '{profile.name}' takes {width} x {height}, give another --display"
-        )
-    if text.get("lfd:profile-hash", profile.hash) != profile.hash:
-        warn(f"{eia}: made for {made_for}, whose figures differ from '{profile.name}'")
-    views = text.get("lfd:views", "")
-    return pixels, int(views) if re.fullmatch(r"[1-9]\d{0,3}", views) else None

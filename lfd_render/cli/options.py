@@ -113,6 +113,14 @@ class FilterLight(StrEnum):
     ENCODED = "encoded"
 
 
+class Format(StrEnum):
+    """What kind of file a panel image becomes."""
+
+    PNG = "png"
+    EXR = "exr"
+    RAW = "raw"
+
+
 class Spacing(StrEnum):
     """Rule by which the eyes of the views stand."""
 
@@ -123,11 +131,16 @@ class Spacing(StrEnum):
 
 def parse_view_size(text: str | None) -> tuple[int, int] | None:
     """Columns and rows of ``480x360``; None stays None. Raises UsageError."""
+    return parse_size("--view-size", text)
+
+
+def parse_size(option: str, text: str | None, example: str = "480x360") -> tuple[int, int] | None:
+    """The two numbers of an option's ``480x360``; None stays None. Raises UsageError."""
     if text is None:
         return None
     match = re.fullmatch(r"([1-9]\d{0,5})[x×]([1-9]\d{0,5})", text.strip().lower())
     if not match:
-        raise UsageError(f"--view-size: '{text}'; give columns x rows, as 480x360")
+        raise UsageError(f"{option}: '{text}'; give columns x rows, as {example}")
     return int(match[1]), int(match[2])
 
 
@@ -155,6 +168,11 @@ def parse_supersample(text: str) -> tuple[int, int]:
             f"--supersample: '{text}'; give none, spatial, angular, or pixels x eyes, as 2x3"
         )
     return int(match[1]), int(match[2])
+
+
+def parse_tiles(text: str | None) -> tuple[int, int] | None:
+    """Columns and rows of ``8x6``; None stays None. Raises UsageError."""
+    return parse_size("--tiles", text, "8x6")
 
 
 def check_device(text: str) -> str:
@@ -300,6 +318,17 @@ EnvironmentTurnOption = Annotated[
 ]
 EnvironmentIntensityOption = Annotated[
     float, typer.Option(metavar="F", help="Scale the environment's light.")
+]
+FormatOption = Annotated[
+    Format | None,
+    typer.Option(
+        help="png: sRGB; exr: scene-linear half floats, before exposure; raw: sRGB bytes, row by "
+        "row, beside a .json. Else by the file's name; png to stdout."
+    ),
+]
+TilesOption = Annotated[
+    str | None,
+    typer.Option(metavar="CxR", help="Columns and rows of the quilt, as 8x6."),
 ]
 LodOption = Annotated[
     Lod | None,

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -23,8 +22,12 @@ def render(
     scene: options.SceneArgument,
     *,
     output: Annotated[
-        str, typer.Option("--output", "-o", metavar="FILE", help="PNG to write; - for stdout.")
+        str,
+        typer.Option(
+            "--output", "-o", metavar="FILE", help=".png, .exr or .raw to write; - for stdout."
+        ),
     ],
+    format: options.FormatOption = None,
     display: options.DisplayOption = options.DEFAULT_DISPLAY,
     views: options.ViewsOption = None,
     view_size: options.ViewSizeOption = None,
@@ -65,7 +68,7 @@ def render(
     count = options.parse_views(views)
     samples = options.parse_supersample(supersample)
     options.check_device(device)
-    check_picture_output(output, json)
+    kind = check_picture_output(output, json, list(options.Format), format)
 
     watch = Stopwatch()
     with watch.span("load"), progress("Loading"):
@@ -106,7 +109,7 @@ def render(
             aa_light=aa_light.value,
             supersample=samples,
             # Views are woven faster where nobody asks for linear pixels.
-            linear=Path(output).suffix.lower() != ".png",
+            linear=kind == "exr",
             splat=splat.value,
             spacing=spacing.value if spacing else None,
             lod=lod.value if lod else None,
@@ -123,7 +126,7 @@ def render(
             **light,
         )
     with watch.span("encode"), progress("Writing"):
-        write_picture(output, eia.save)
+        write_picture(output, lambda file: eia.save(file, kind))
 
     for warning in eia.report["warnings"]:
         if warning not in loaded.warnings:  # those were said when it was loaded

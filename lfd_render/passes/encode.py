@@ -14,20 +14,24 @@ from lfd_render.passes.view_target import ViewImages
 
 
 class Encode:
-    """Linear texture layer → uint8 picture: exposure, tone curve, sRGB."""
+    """Linear texture layer → uint8 picture: exposure, tone curve, sRGB; of pictures that have had
+    theirs (`developed`) sRGB alone."""
 
-    def __init__(self, device: Device, width: int, height: int) -> None:
-        self._pass = ScreenPass(device, "encode/encode.frag")
+    def __init__(self, device: Device, width: int, height: int, *, developed: bool = False) -> None:
+        self._developed = developed
+        self._pass = ScreenPass(device, "encode/srgb.frag" if developed else "encode/encode.frag")
         self._picture = TextureArray(device, "picture", (width, height, 1), gl.RGBA8)
         self._framebuffer = LayerTarget(device, self._picture, depth=False)
 
-    def __call__(self, linear: TextureArray, layer: int, exposure: float) -> None:
+    def __call__(self, linear: TextureArray, layer: int, exposure: float = 1.0) -> None:
         """Encode one layer of a texture of the picture's size."""
+        assert exposure == 1.0 or not self._developed
+        light = {} if self._developed else {"exposure": exposure}
         width, height = self._picture.width, self._picture.height
         self._framebuffer.use(0)
         self._pass(
             {},
-            {"exposure": exposure, "layer": layer},
+            {**light, "layer": layer},
             {"linear_image": linear},
             (0, height),
             width,

@@ -12,14 +12,17 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lfd_render.display import Camera, DisplayProfile, Rig
+from lfd_render.display import Camera, DisplayProfile, Rig, ViewGrid
 from lfd_render.errors import ResourceError, SceneError, UsageError
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.lighting import EnvironmentMap
 from lfd_render.gpu.scene_buffers import SceneBuffers
-from lfd_render.panel.eia import Eia
+from lfd_render.panel.eia import Eia, eia_metadata
+from lfd_render.panel.quilt import Quilt
 from lfd_render.panel.stage import PanelOptions
+from lfd_render.panel.unweave import Unwoven
+from lfd_render.panel.weaving import check_views, weave_pictures
 from lfd_render.passes.average import Average
 from lfd_render.passes.encode import Encode
 from lfd_render.passes.placement import Placement
@@ -154,14 +157,21 @@ class Renderer:
         frames.release()
         if choice.technique == "lfdpr" and report["points"] == 0:
             report["warnings"].append("nothing of the scene can be seen through the window")
-        metadata = {
-            "lfd:profile": display.name,
-            "lfd:profile-hash": display.hash,
+        metadata = eia_metadata(
+            display,
             # As many as `look` takes rows for: where views are more than rows allow, the display's.
-            "lfd:views": str(plan.views if plan.rows_follow_views else display.views),
-            "lfd:technique": choice.technique,
-            "lfd:seed": str(choice.seed),
-        }
+            plan.views if plan.rows_follow_views else display.views,
+            grid,
+            technique=choice.technique,
+            preset=choice.preset,
+            lod=choice.lod_rule,
+            seed=choice.seed,
+            exposure=choice.exposure,
+            lookup=plan.rule.lookup,
+            weave=plan.rule.weave,
+            aa=plan.rule.aa,
+            supersample="x".join(map(str, choice.supersample)),
+        )
         return Eia(pixels, linear, report, metadata)
 
     def views(
@@ -223,6 +233,46 @@ class Renderer:
         for owner in (technique, encode, average):
             owner.release()
         return pictures
+
+    def weave(
+        self,
+        views: NDArray[np.uint8] | Quilt | Unwoven,
+        display: DisplayProfile,
+        grid: ViewGrid | None = None,
+    ) -> Eia:
+        """Weave pictures of views into the panel image of a display: a quilt, unwoven views, or
+        uint8 [view, y, x, 3] in sRGB, view 0 leftmost, upright unless `grid` says otherwise.
+
+        Between columns of upright views light is mixed; views that follow the lenses keep their
+        very codes. Raises UsageError for arrays that are no views, ResourceError or GpuError.
+        """
+        if not isinstance(display, DisplayProfile):
+            raise UsageError(f"display: {display!r}; give a DisplayProfile, as its load(…) makes")
+        if isinstance(views, Unwoven):
+            grid = views.grid
+        pictures = views if isinstance(views, np.ndarray) else views.views
+        if pictures.ndim != 4:
+            raise UsageError(f"views: shape {list(pictures.shape)}; give uint8 [view, y, x, 3]")
+        grid = grid or ViewGrid.upright(display, pictures.shape[2], pictures.shape[1])
+        check_views(pictures, grid)
+        count = len(pictures)
+        timings = Timings()
+        with self._call():
+            pixels, linear = timings.measure(
+                "weave",
+                self.device,
+                lambda: weave_pictures(self.device, pictures, display, grid),
+            )
+        report = {
+            "views": count,
+            "view_size": [grid.columns, grid.rows],
+            "view_grid": grid.kind,
+            "renderer": self.device.name,
+            "device_bytes": self.device.ledger.peak,
+            "warnings": [],
+            "timings_ms": timings.summary(),
+        }
+        return Eia(pixels, linear, report, eia_metadata(display, count, grid, technique="weave"))
 
     @contextmanager
     def _call(self) -> Iterator[None]:

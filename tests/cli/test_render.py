@@ -257,9 +257,47 @@ def test_dash_writes_the_picture_to_stdout(
 
 
 @pytest.mark.parametrize(
+    ("output", "options", "kind"),
+    [
+        ("out.exr", (), "exr"),
+        ("out.raw", (), "raw"),
+        ("out", ("--format", "png"), "png"),
+        ("out.png", ("--format", "exr"), "exr"),
+        ("-", ("--format", "raw"), "raw"),
+        ("-", ("--format", "exr"), "exr"),
+    ],
+)
+def test_formats_by_name_or_as_asked(
+    command: Command,
+    scene: Path,
+    display: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    output: str,
+    options: tuple[str, ...],
+    kind: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    stdout = io.TextIOWrapper(io.BytesIO())
+    if output == "-":
+        monkeypatch.setattr(sys, "stdout", stdout)
+    assert command("render", scene, "-o", output, "-d", display, *options).code == 0
+    stdout.seek(0)
+    data = stdout.buffer.read() if output == "-" else (tmp_path / output).read_bytes()
+    starts = {"exr": b"\x76\x2f\x31\x01", "png": b"\x89PNG", "raw": b"\x7f" * 4}
+    assert data.startswith(starts[kind])
+    if kind == "raw":
+        assert len(data) == PANEL[0] * PANEL[1] * 3
+    names = {path.name for path in tmp_path.iterdir()}
+    expected = set() if output == "-" else {output} | ({"out.raw.json"} if kind == "raw" else set())
+    assert names == expected
+
+
+@pytest.mark.parametrize(
     ("output", "code", "words"),
     [
         ("missing/out.png", 8, "no such folder"),
+        ("/dev/null", 8, "is a device"),
         (".", 8, "is a folder"),
         ("/proc/out.png", 8, "/proc"),
         ("out.jpg", 2, ".png"),

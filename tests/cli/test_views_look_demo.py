@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from lfd_render.panel.picture import read_picture
+from lfd_render.panel.picture import read_picture, read_png_text
 
 from .conftest import PANEL, VIEWS, Command, FakeRenderer
 
@@ -30,6 +30,9 @@ def test_views_are_numbered_from_the_left(
     assert result.json["view_size"] == [24, 14]
     shades = [int(read_picture(folder / name)[0, 0, 0]) for name in names]
     assert shades == list(range(VIEWS))
+    texts = [read_png_text(folder / name) for name in names]
+    assert [text["lfd:view"] for text in texts] == [str(index) for index in range(VIEWS)]
+    assert texts[0]["lfd:profile"] == "small"
 
 
 def test_a_failure_leaves_no_folder(
