@@ -3,14 +3,16 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from lfd_render.version import __version__
+
 if TYPE_CHECKING:
     from lfd_render.display import Camera, DisplayProfile
     from lfd_render.panel.eia import Eia
     from lfd_render.panel.look import look
+    from lfd_render.panel.quilt import Quilt
+    from lfd_render.panel.unweave import unweave
     from lfd_render.renderer import Renderer
     from lfd_render.scene import Environment, Pose, Scene, node_transform
-
-__version__ = "0.1.0"
 
 __all__ = [
     "Camera",
@@ -18,11 +20,13 @@ __all__ = [
     "Eia",
     "Environment",
     "Pose",
+    "Quilt",
     "Renderer",
     "Scene",
     "__version__",
     "look",
     "node_transform",
+    "unweave",
 ]
 
 # Loaded when first used, so that the command line answers --help without numpy or OpenGL.
@@ -32,10 +36,12 @@ _HOMES = {
     "Eia": "lfd_render.panel.eia",
     "Environment": "lfd_render.scene",
     "Pose": "lfd_render.scene",
+    "Quilt": "lfd_render.panel.quilt",
     "Renderer": "lfd_render.renderer",
     "Scene": "lfd_render.scene",
     "look": "lfd_render.panel.look",
     "node_transform": "lfd_render.scene",
+    "unweave": "lfd_render.panel.unweave",
 }
 
 

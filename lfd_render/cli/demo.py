@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -11,15 +11,9 @@ from lfd_render.cli.console import progress, say
 from lfd_render.cli.inputs import load_display, load_light, load_scene, place_camera
 from lfd_render.cli.outputs import check_folder_output, make_folder
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
 SCENE = "builtin:gallery?triangles=300000"
 # Where the eyes are, in cones from the middle.
 EYES = {"left": -0.375, "centre": 0.0, "right": 0.375}
-GAP_PX = 8
-PAPER = 255
 
 
 def demo(
@@ -49,7 +43,7 @@ def demo(
         )
 
     from lfd_render.panel.look import look  # noqa: PLC0415 (keeps --help quick)
-    from lfd_render.panel.picture import write_png  # noqa: PLC0415
+    from lfd_render.panel.picture import side_by_side, write_png  # noqa: PLC0415
     from lfd_render.renderer import Renderer  # noqa: PLC0415
 
     with progress("Rendering"), Renderer(device=device) as renderer:
@@ -65,12 +59,3 @@ def demo(
     height, width = eia.pixels.shape[:2]
     say(f"{folder}/eia.png: the panel image, {width} × {height}, on {eia.report['renderer']}")
     say(f"{folder}/preview.png: seen from the left, centre and right of the display")
-
-
-def side_by_side(pictures: list[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    """Pictures of one size, uint8 [y, x, 3] each, in a row with gaps."""
-    import numpy as np  # noqa: PLC0415 (keeps --help quick)
-
-    gap = np.full((pictures[0].shape[0], GAP_PX, 3), PAPER, np.uint8)
-    parts = [part for picture in pictures for part in (gap, picture)][1:]
-    return np.concatenate(parts, axis=1)

@@ -23,7 +23,9 @@ from lfd_render.gpu import system
 if TYPE_CHECKING:
     from lfd_render.gpu.device import Device
 
-PACKAGES = ("moderngl", "glcontext", "numpy", "Pillow", "OpenImageIO", "pydantic", "fastapi")
+PACKAGES = (
+    "moderngl", "glcontext", "numpy", "Pillow", "OpenImageIO", "isal", "pydantic", "fastapi"
+)  # fmt: skip
 # Each capability, and the extensions any one of which gives it.
 CAPABILITIES = {
     "int64_atomics": ("GL_NV_shader_atomic_int64",),

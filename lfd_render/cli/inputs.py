@@ -12,6 +12,7 @@ from lfd_render.errors import SceneError, UsageError
 
 if TYPE_CHECKING:
     from lfd_render.display import Camera, DisplayProfile
+    from lfd_render.panel.eia import EiaFile
     from lfd_render.scene import Scene, SceneCamera
 
 
@@ -33,6 +34,16 @@ def display_warnings(profile: DisplayProfile) -> list[str]:
         f"display '{profile.name}': its figures are a model's or assumed; "
         "a real unit needs its own calibration"
     ]
+
+
+def load_eia(path: str, profile: DisplayProfile) -> EiaFile:
+    """The panel image of a file, with its warnings said; raises PictureError."""
+    from lfd_render.panel.eia import read_eia  # noqa: PLC0415 (keeps --help quick)
+
+    file = read_eia(path, profile)
+    for warning in file.warnings:
+        warn(warning)
+    return file
 
 
 def load_scene(source: str) -> Scene:

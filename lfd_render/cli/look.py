@@ -2,88 +2,139 @@
 
 from __future__ import annotations
 
-import math
-import re
-from typing import TYPE_CHECKING, Annotated
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
 from lfd_render.cli import options
-from lfd_render.cli.console import Stopwatch, print_json, progress, say, warn
-from lfd_render.cli.inputs import display_warnings, load_display
-from lfd_render.cli.outputs import check_picture_output, write_picture
-from lfd_render.errors import PictureError
+from lfd_render.cli.console import Stopwatch, print_json, progress, say
+from lfd_render.cli.eyes import stands
+from lfd_render.cli.inputs import display_warnings, load_display, load_eia
+from lfd_render.cli.outputs import (
+    STDOUT,
+    check_folder_output,
+    check_picture_output,
+    filling,
+    write_picture,
+)
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+EYES_APART_MM = 64.0
 
-    from lfd_render.display import DisplayProfile
+
+class Optics(StrEnum):
+    """How a lens sends light."""
+
+    RIG = "rig"
+    SLAB = "slab"
 
 
 def look(
     eia: Annotated[str, typer.Argument(metavar="EIA", help="Panel image of the display.")],
     *,
     angle: Annotated[
-        float, typer.Option(metavar="DEG", help="Where the eye is; positive: to the right.")
-    ],
+        float | None,
+        typer.Option(metavar="DEG", help="Where the eye is; positive: to the right."),
+    ] = None,
+    eye: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z",
+            help="Where the eye is: mm right, up and near from the panel's centre.",
+        ),
+    ] = None,
+    sweep: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FROM:TO:N",
+            help="N angles in degrees: a strip of pictures, or frame_000.png … in a folder.",
+        ),
+    ] = None,
+    stereo: Annotated[
+        bool, typer.Option("--stereo", help="Two eyes side by side, the left one's picture first.")
+    ] = False,
+    eyes_apart: Annotated[
+        float, typer.Option(metavar="MM", min=0.0, help="With --stereo: how far apart they are.")
+    ] = EYES_APART_MM,
     output: Annotated[
-        str, typer.Option("--output", "-o", metavar="FILE", help="PNG to write; - for stdout.")
+        str,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE|FOLDER",
+            help="PNG to write; - for stdout; of a sweep, a folder gets its frames.",
+        ),
     ],
     display: options.DisplayOption = options.DEFAULT_DISPLAY,
     views: Annotated[
         int | None, typer.Option(min=1, help="Number of views woven in; else as the file says.")
     ] = None,
     view_size: options.ViewSizeOption = None,
+    crosstalk: Annotated[
+        float | None,
+        typer.Option(
+            metavar="VIEWS",
+            min=0.0,
+            help="Standard deviation of a lens's angular response; else the display's own.",
+        ),
+    ] = None,
+    optics: Annotated[
+        Optics,
+        typer.Option(help="rig: each view goes where it was seen from; slab: by Snell's law."),
+    ] = Optics.RIG,
     json: options.JsonOption = False,
 ) -> None:
-    """Show a panel image as seen from an angle, without crosstalk."""
+    """Show a panel image as an eye in front of the display sees it."""
     size = options.parse_view_size(view_size)
-    check_picture_output(output, json)
+    as_frames = sweep is not None and output != STDOUT and not Path(output).suffix
+    if as_frames:
+        folder = check_folder_output(output)
+    else:
+        check_picture_output(output, json)
 
-    from lfd_render.panel.look import look as look_at  # noqa: PLC0415 (keeps --help quick)
-    from lfd_render.panel.picture import write_png  # noqa: PLC0415
+    from lfd_render.panel.look import look_from  # noqa: PLC0415 (keeps --help quick)
+    from lfd_render.panel.picture import side_by_side, write_png  # noqa: PLC0415
 
     watch = Stopwatch()
     with watch.span("load"):
         profile = load_display(display)
-        pixels, woven = _read_panel_image(eia, profile)
+        places = stands(profile, angle, eye, sweep)
+        panel = load_eia(eia, profile)
     with watch.span("look"), progress("Looking"):
-        seen = look_at(pixels, profile, math.radians(angle), views=views or woven, size_px=size)
+        seen = [
+            side_by_side(
+                [
+                    look_from(
+                        panel.pixels, profile, at, views or panel.views, size,
+                        sigma_views=crosstalk, optics=optics.value,
+                    )
+                    for at in place.eyes(eyes_apart if stereo else None)
+                ]
+            )
+            for place in places
+        ]  # fmt: skip
     with watch.span("encode"):
-        write_picture(output, lambda file: write_png(file, seen))
+        if as_frames:
+            names = [f"frame_{index:03d}.png" for index in range(len(seen))]
+            with filling(folder) as temporary:
+                for name, picture in zip(names, seen, strict=True):
+                    write_png(temporary / name, picture)
+        else:
+            strip = side_by_side(seen)
+            write_picture(output, lambda file: write_png(file, strip))
 
-    height, width = seen.shape[:2]
+    height, width = seen[0].shape[:2]
     if json:
-        print_json(
-            {
-                "output": output,
-                "display": profile.name,
-                "angle_deg": angle,
-                "view_size": [width, height],
-                "warnings": display_warnings(profile),
-                "timings_ms": watch.finish(),
-            }
-        )
-    say(f"{output}: {width} × {height}, seen from {angle:g}°")
-
-
-def _read_panel_image(eia: str, profile: DisplayProfile) -> tuple[NDArray[np.uint8], int | None]:
-    """Pixels, uint8 [y, x, 3], and the number of views woven in where the file says it.
-
-    Raises PictureError for a file that is no picture of the display's size.
-    """
-    from lfd_render.panel.picture import read_picture, read_png_text  # noqa: PLC0415
-
-    pixels, text = read_picture(eia), read_png_text(eia)
-    made_for = text.get("lfd:profile", "an unnamed display")
-    width, height = profile.resolution_px
-    if pixels.shape[:2] != (height, width):
-        raise PictureError(
-            f"{eia}: {pixels.shape[1]} x {pixels.shape[0]} pixels, made for {made_for}; "
-            f"the display '{profile.name}' takes {width} x {height}, give another --display"
-        )
-    if text.get("lfd:profile-hash", profile.hash) != profile.hash:
-        warn(f"{eia}: made for {made_for}, whose figures differ from '{profile.name}'")
-    views = text.get("lfd:views", "")
-    return pixels, int(views) if re.fullmatch(r"[1-9]\d{0,3}", views) else None
+        result = {
+            "output": [str(folder / name) for name in names] if as_frames else output,
+            "display": profile.name,
+            "eyes_mm": [place.eyes(eyes_apart if stereo else None) for place in places],
+            "view_size": [width, height],
+            "warnings": [*display_warnings(profile), *panel.warnings],
+            "timings_ms": watch.finish(),
+        }
+        print_json(result if angle is None else result | {"angle_deg": angle})
+    said = places[0].said if len(places) == 1 else f"{places[0].said} to {places[-1].said}"
+    pictures = "" if len(seen) == 1 else f"{len(seen)} pictures of "
+    say(f"{output}: {pictures}{width} × {height}, seen from {said}")

@@ -17,8 +17,11 @@ from lfd_render.cli.console import PROGRAM, say_error
 from lfd_render.cli.demo import demo
 from lfd_render.cli.doctor import doctor
 from lfd_render.cli.look import look
+from lfd_render.cli.quilt import quilt
 from lfd_render.cli.render import render
+from lfd_render.cli.unweave import unweave
 from lfd_render.cli.views import views
+from lfd_render.cli.weave import weave
 from lfd_render.errors import (
     EXIT_CODES,
     EXIT_INTERNAL,
@@ -32,7 +35,7 @@ from lfd_render.errors import (
 app = typer.Typer(
     pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]}
 )
-for command in (render, views, look, demo, doctor):
+for command in (render, views, quilt, weave, unweave, look, demo, doctor):
     app.command()(command)
 
 

@@ -3,7 +3,7 @@
 import math
 import re
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -26,6 +26,7 @@ class Preset(StrEnum):
 
     DEFAULT = "default"
     PAPER = "paper"
+    GOLD = "gold"
 
 
 class Splat(StrEnum):
@@ -82,6 +83,44 @@ class ShadePlace(StrEnum):
     POINT = "point"
 
 
+class Lookup(StrEnum):
+    """Where on the panel a subpixel's view is sampled."""
+
+    LENS = "lens"
+    SUBPIXEL = "subpixel"
+
+
+class Weaving(StrEnum):
+    """How many views a subpixel is made of."""
+
+    NEAREST = "nearest"
+    LINEAR = "linear"
+
+
+class Filter(StrEnum):
+    """What the reconstruction filter spreads over."""
+
+    NONE = "none"
+    SPATIAL = "spatial"
+    ANGULAR = "angular"
+    BOTH = "both"
+
+
+class FilterLight(StrEnum):
+    """What filters average."""
+
+    LINEAR = "linear"
+    ENCODED = "encoded"
+
+
+class Format(StrEnum):
+    """What kind of file a panel image becomes."""
+
+    PNG = "png"
+    EXR = "exr"
+    RAW = "raw"
+
+
 class Spacing(StrEnum):
     """Rule by which the eyes of the views stand."""
 
@@ -92,12 +131,48 @@ class Spacing(StrEnum):
 
 def parse_view_size(text: str | None) -> tuple[int, int] | None:
     """Columns and rows of ``480x360``; None stays None. Raises UsageError."""
+    return parse_size("--view-size", text)
+
+
+def parse_size(option: str, text: str | None, example: str = "480x360") -> tuple[int, int] | None:
+    """The two numbers of an option's ``480x360``; None stays None. Raises UsageError."""
     if text is None:
         return None
     match = re.fullmatch(r"([1-9]\d{0,5})[x×]([1-9]\d{0,5})", text.strip().lower())
     if not match:
-        raise UsageError(f"--view-size: '{text}'; give columns x rows, as 480x360")
+        raise UsageError(f"{option}: '{text}'; give columns x rows, as {example}")
     return int(match[1]), int(match[2])
+
+
+def parse_views(text: str | None) -> int | Literal["continuous"] | None:
+    """A number of views, or ``continuous``; None stays None. Raises UsageError."""
+    if text is None:
+        return None
+    if text.strip().lower() == "continuous":
+        return "continuous"
+    if not re.fullmatch(r"[1-9]\d{0,5}", text.strip()):
+        raise UsageError(f"--views: '{text}'; give a whole number from 1, or continuous")
+    return int(text)
+
+
+def parse_supersample(text: str) -> tuple[int, int]:
+    """Pixels each way and eyes a view of ``none``, ``spatial``, ``angular`` or ``2x3``. Raises
+    UsageError."""
+    named = {"none": (1, 1), "spatial": (2, 1), "angular": (1, 2)}
+    chosen = text.strip().lower()
+    if chosen in named:
+        return named[chosen]
+    match = re.fullmatch(r"([1-9]\d?)[x×]([1-9]\d?)", chosen)
+    if not match:
+        raise UsageError(
+            f"--supersample: '{text}'; give none, spatial, angular, or pixels x eyes, as 2x3"
+        )
+    return int(match[1]), int(match[2])
+
+
+def parse_tiles(text: str | None) -> tuple[int, int] | None:
+    """Columns and rows of ``8x6``; None stays None. Raises UsageError."""
+    return parse_size("--tiles", text, "8x6")
 
 
 def check_device(text: str) -> str:
@@ -133,8 +208,11 @@ DisplayOption = Annotated[
     typer.Option("--display", "-d", metavar="NAME|FILE", help="Display profile."),
 ]
 ViewsOption = Annotated[
-    int | None,
-    typer.Option(min=1, help="Number of views; else the display's."),
+    str | None,
+    typer.Option(
+        metavar="N|continuous",
+        help="Number of views, or an angle for each subpixel; else the display's.",
+    ),
 ]
 ViewSizeOption = Annotated[
     str | None,
@@ -143,7 +221,10 @@ ViewSizeOption = Annotated[
 TechniqueOption = Annotated[Technique, typer.Option(help="Rendering technique.")]
 PresetOption = Annotated[
     Preset,
-    typer.Option(help="default: our best; paper: every choice as the paper has it."),
+    typer.Option(
+        help="default: our best; paper: every choice as the paper has it; "
+        "gold: the slow picture to measure others by, of 96 views as large as the panel."
+    ),
 ]
 SplatOption = Annotated[
     Splat,
@@ -238,9 +319,42 @@ EnvironmentTurnOption = Annotated[
 EnvironmentIntensityOption = Annotated[
     float, typer.Option(metavar="F", help="Scale the environment's light.")
 ]
+FormatOption = Annotated[
+    Format | None,
+    typer.Option(
+        help="png: sRGB; exr: scene-linear half floats, before exposure; raw: sRGB bytes, row by "
+        "row, beside a .json. Else by the file's name; png to stdout."
+    ),
+]
+TilesOption = Annotated[
+    str | None,
+    typer.Option(metavar="CxR", help="Columns and rows of the quilt, as 8x6."),
+]
 LodOption = Annotated[
     Lod | None,
     typer.Option(help="How textures are filtered; else as the preset has it."),
+]
+LookupOption = Annotated[
+    Lookup, typer.Option(help="Sample views at the subpixel's lens, or at the subpixel itself.")
+]
+WeavingOption = Annotated[
+    Weaving, typer.Option(help="The nearest view, or linear between the nearest two.")
+]
+FilterOption = Annotated[
+    Filter | None,
+    typer.Option(
+        "--aa", help="Gaussian filter over view pixels, views or both; else as the preset has it."
+    ),
+]
+FilterLightOption = Annotated[
+    FilterLight, typer.Option("--aa-light", help="Filter linear light, or encoded pixels.")
+]
+SupersampleOption = Annotated[
+    str,
+    typer.Option(
+        metavar="none|spatial|angular|NxM",
+        help="N × N pixels for one and M eyes a view; spatial is 2x1, angular 1x2.",
+    ),
 ]
 SeedOption = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Seed of all random choices.")]
 DeviceOption = Annotated[

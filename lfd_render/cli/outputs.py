@@ -1,22 +1,26 @@
 """Where results go: checked before any rendering, written whole or not at all."""
 
 import os
+import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from lfd_render.cli.console import writing_stdout
+from lfd_render.cli.console import warn, writing_stdout
 from lfd_render.errors import OutputError, UsageError
 
 STDOUT = "-"
-PICTURE_SUFFIXES = (".png",)
+_VIEW_NAME = re.compile(r"view_\d{3,}\.png")
 
 
-def check_picture_output(output: str, json: bool = False) -> None:
-    """Raise before work starts if a picture cannot be written to this file, or to stdout.
+def check_picture_output(
+    output: str, json: bool = False, formats: Sequence[str] = ("png",), asked: str | None = None
+) -> str:
+    """The format of a picture that goes to this file, or to stdout: the one asked for, else what
+    the name ends in, else the first. Raises before work starts if it cannot be written there.
 
     OutputError for a place that cannot be written, UsageError for a name that makes no sense.
     """
@@ -25,14 +29,18 @@ def check_picture_output(output: str, json: bool = False) -> None:
             raise UsageError("-o -: stdout carries either the picture or --json's object; drop one")
         if sys.stdout.isatty():
             raise UsageError("-o -: stdout is a terminal; send the picture to a file or a pipe")
-        return
+        return asked or formats[0]
     path = Path(output)
     if path.is_dir():
         raise OutputError(f"{output}: is a folder; give a file name")
-    if path.suffix.lower() not in PICTURE_SUFFIXES:
-        known = " or ".join(PICTURE_SUFFIXES)
+    if path.exists() and not path.is_file():
+        raise OutputError(f"{output}: is a device or a pipe; give a file name, or - for stdout")
+    named = path.suffix.lower()[1:]
+    if asked is None and named not in formats:
+        known = " or ".join(f".{name}" for name in formats)
         raise UsageError(f"{output}: suffix '{path.suffix}'; give {known}, or - for stdout")
     _check_folder(path.parent)
+    return asked or named
 
 
 def check_folder_output(output: str) -> Path:
@@ -78,6 +86,16 @@ def filling(folder: Path) -> Iterator[Path]:
         raise
 
 
+def remove_others(folder: Path, written: Sequence[Path]) -> None:
+    """Remove views of an earlier run, which are not among those written, and say so."""
+    views = [file for file in folder.iterdir() if _VIEW_NAME.fullmatch(file.name)]
+    older = [file for file in views if file not in written]
+    for file in older:
+        file.unlink(missing_ok=True)
+    if older:
+        warn(f"{folder}: {len(older)} views of an earlier run, with more views, are removed")
+
+
 def _remove_empty(folder: Path) -> None:
     try:
         folder.rmdir()
@@ -91,7 +109,7 @@ def write_picture(output: str, save: Callable[[Path], object]) -> None:
         save(Path(output))
         return
     with tempfile.TemporaryDirectory(prefix="lfd-render-") as folder:
-        file = Path(folder) / f"picture{PICTURE_SUFFIXES[0]}"
+        file = Path(folder) / "picture"
         save(file)
         with file.open("rb") as picture, writing_stdout():
             shutil.copyfileobj(picture, sys.stdout.buffer)

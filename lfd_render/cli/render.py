@@ -1,11 +1,13 @@
 """`lfd-render render`: a scene becomes the panel image of a display."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Annotated
 
 import typer
 
 from lfd_render.cli import options
-from lfd_render.cli.console import Stopwatch, print_json, progress, say, warn
+from lfd_render.cli.console import Stopwatch, print_json, progress, progress_bar, say, warn
 from lfd_render.cli.inputs import (
     display_warnings,
     load_display,
@@ -20,13 +22,22 @@ def render(
     scene: options.SceneArgument,
     *,
     output: Annotated[
-        str, typer.Option("--output", "-o", metavar="FILE", help="PNG to write; - for stdout.")
+        str,
+        typer.Option(
+            "--output", "-o", metavar="FILE", help=".png, .exr or .raw to write; - for stdout."
+        ),
     ],
+    format: options.FormatOption = None,
     display: options.DisplayOption = options.DEFAULT_DISPLAY,
     views: options.ViewsOption = None,
     view_size: options.ViewSizeOption = None,
     technique: options.TechniqueOption = options.Technique.LFDPR,
     preset: options.PresetOption = options.Preset.DEFAULT,
+    lookup: options.LookupOption = options.Lookup.LENS,
+    weave: options.WeavingOption = options.Weaving.NEAREST,
+    aa: options.FilterOption = None,
+    aa_light: options.FilterLightOption = options.FilterLight.LINEAR,
+    supersample: options.SupersampleOption = "none",
     splat: options.SplatOption = options.Splat.AUTO,
     camera: options.CameraOption = None,
     focus_distance: options.FocusDistanceOption = None,
@@ -54,8 +65,10 @@ def render(
 ) -> None:
     """Render SCENE into the panel image (EIA) of a display."""
     size = options.parse_view_size(view_size)
+    count = options.parse_views(views)
+    samples = options.parse_supersample(supersample)
     options.check_device(device)
-    check_picture_output(output, json)
+    kind = check_picture_output(output, json, list(options.Format), format)
 
     watch = Stopwatch()
     with watch.span("load"), progress("Loading"):
@@ -79,15 +92,24 @@ def render(
 
     from lfd_render.renderer import Renderer  # noqa: PLC0415 (keeps --help quick)
 
-    with progress("Rendering"), Renderer(device=device) as renderer:
+    shown = progress_bar if preset == options.Preset.GOLD or count == "continuous" else _status
+    with shown("Rendering") as done, Renderer(device=device) as renderer:
         eia = renderer.render(
             loaded,
             profile,
             window,
-            views=views,
+            views=count,
+            progress=done,
             view_size=size,
             technique=technique.value,
             preset=preset.value,
+            lookup=lookup.value,
+            weave=weave.value,
+            aa=aa.value if aa else None,
+            aa_light=aa_light.value,
+            supersample=samples,
+            # Views are woven faster where nobody asks for linear pixels.
+            linear=kind == "exr",
             splat=splat.value,
             spacing=spacing.value if spacing else None,
             lod=lod.value if lod else None,
@@ -104,7 +126,7 @@ def render(
             **light,
         )
     with watch.span("encode"), progress("Writing"):
-        write_picture(output, eia.save)
+        write_picture(output, lambda file: eia.save(file, kind))
 
     for warning in eia.report["warnings"]:
         if warning not in loaded.warnings:  # those were said when it was loaded
@@ -120,3 +142,10 @@ def render(
         f"{output}: {width} × {height}, {eia.report['views']} views by {technique.value}, "
         f"a frame in {watch.timings_ms['frame']:.0f} ms on {eia.report['renderer']}"
     )
+
+
+@contextmanager
+def _status(message: str) -> Iterator[None]:
+    """What is shown of work too short for a bar."""
+    with progress(message):
+        yield None

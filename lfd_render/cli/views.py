@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from lfd_render.cli import options
-from lfd_render.cli.console import Stopwatch, print_json, progress, say, warn
+from lfd_render.cli.console import Stopwatch, print_json, progress, say
 from lfd_render.cli.inputs import (
     display_warnings,
     load_display,
@@ -17,9 +16,7 @@ from lfd_render.cli.inputs import (
     load_scene,
     place_camera,
 )
-from lfd_render.cli.outputs import check_folder_output, filling
-
-_VIEW_NAME = re.compile(r"view_\d{3,}\.png")
+from lfd_render.cli.outputs import check_folder_output, filling, remove_others
 
 if TYPE_CHECKING:
     import numpy as np
@@ -43,6 +40,7 @@ def views(
     view_size: options.ViewSizeOption = None,
     technique: options.TechniqueOption = options.Technique.LFDPR,
     preset: options.PresetOption = options.Preset.DEFAULT,
+    supersample: options.SupersampleOption = "none",
     camera: options.CameraOption = None,
     focus_distance: options.FocusDistanceOption = None,
     yaw: options.YawOption = 0.0,
@@ -66,6 +64,7 @@ def views(
 ) -> None:
     """Write the single upright views of SCENE, view_000.png leftmost."""
     size = options.parse_view_size(view_size)
+    samples = options.parse_supersample(supersample)
     options.check_device(device)
     folder = check_folder_output(output)
 
@@ -100,6 +99,7 @@ def views(
             view_size=size,
             technique=technique.value,
             preset=preset.value,
+            supersample=samples,
             spacing=spacing.value if spacing else None,
             lod=lod.value if lod else None,
             lattice=lattice.value if lattice else None,
@@ -113,7 +113,15 @@ def views(
             **light,
         )
     with watch.span("encode"), progress("Writing"):
-        files = _write(folder, pictures)
+        text = {
+            "lfd:profile": profile.name,
+            "lfd:profile-hash": profile.hash,
+            "lfd:views": str(len(pictures)),
+            "lfd:technique": technique.value,
+            "lfd:preset": preset.value,
+            "lfd:seed": str(seed),
+        }
+        files = _write(folder, pictures, text)
 
     if json:
         print_json(
@@ -133,8 +141,8 @@ def views(
     say(f"{folder}: {len(files)} views of {pictures.shape[2]} × {pictures.shape[1]}")
 
 
-def _write(folder: Path, pictures: NDArray[np.uint8]) -> list[Path]:
-    """Write uint8 [view, y, x, 3] as view_000.png and so on; the files in view order.
+def _write(folder: Path, pictures: NDArray[np.uint8], text: dict[str, str]) -> list[Path]:
+    """Write uint8 [view, y, x, 3] as view_000.png and so on, with text; the files in view order.
 
     All appear or none, in the place of all views of an earlier run.
     """
@@ -142,12 +150,8 @@ def _write(folder: Path, pictures: NDArray[np.uint8]) -> list[Path]:
 
     names = [f"view_{index:03d}.png" for index in range(len(pictures))]
     with filling(folder) as temporary:
-        for name, pixels in zip(names, pictures, strict=True):
-            write_png(temporary / name, pixels)
-    views_there = [file for file in folder.iterdir() if _VIEW_NAME.fullmatch(file.name)]
-    older = [file for file in views_there if file.name not in names]
-    for file in older:
-        file.unlink(missing_ok=True)
-    if older:
-        warn(f"{folder}: {len(older)} views of an earlier run, with more views, are removed")
-    return [folder / name for name in names]
+        for index, (name, pixels) in enumerate(zip(names, pictures, strict=True)):
+            write_png(temporary / name, pixels, text | {"lfd:view": str(index)})
+    files = [folder / name for name in names]
+    remove_others(folder, files)
+    return files

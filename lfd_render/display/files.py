@@ -16,6 +16,10 @@ def replacing(path: Path) -> Iterator[Path]:
     On any failure the temporary file is removed and `path` stays as it was. Operating
     system errors become an OutputError naming the file.
     """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise OutputError(
+            f"{path}: is a device or a pipe, which no file may replace; use - or a file"
+        )
     temporary = path.with_name(f".{path.name[:100]}.{uuid.uuid4().hex}.part")
     try:
         yield temporary

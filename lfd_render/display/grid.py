@@ -31,6 +31,7 @@ class ViewGrid:
     row_base: NDArray[np.int32]  # [rows], lens index of column 0; 0 when upright
     kind: Literal["lens", "upright"]
     panel_mm: tuple[float, float]
+    fineness: int = 1  # columns and rows where the grid that this one refines has one
 
     @staticmethod
     def upright(profile: DisplayProfile, columns: int, rows: int) -> ViewGrid:
@@ -69,6 +70,34 @@ class ViewGrid:
         width, height = profile.resolution_px
         rows = round(width * height / (views * int(np.ceil(profile.lens_count))))
         return min(max(rows, 1), height)
+
+    def finer(self, profile: DisplayProfile, times: int) -> ViewGrid:
+        """So many columns and rows for one of this grid; fine rows follow the lenses by themselves.
+
+        Column c of this grid holds the columns from c·times on in all of its fine rows.
+        """
+        if times == 1:
+            return self
+        assert self.fineness == 1
+        rows = self.rows * times
+        base = np.repeat(self.row_base, times)
+        if self.kind == "upright":
+            offset = np.full(rows, self.row_offset[0] * times)
+        else:
+            left, _ = _lambda_at_ends(profile, rows)
+            offset = (left + profile.lens_count / 2 - base) * times
+        return ViewGrid(
+            rows, self.columns * times, self.column_mm / times, offset, base, self.kind,
+            self.panel_mm, times,
+        )  # fmt: skip
+
+    def columns_at(self, profile: DisplayProfile) -> tuple[float, Float64]:
+        """Where the window's u lies in a row: column = scale·P·u + offset[row], as (scale, offset).
+
+        scale is columns a lens.
+        """
+        scale = profile.size_mm[0] / profile.lens_count / self.column_mm
+        return scale, self.row_offset - 0.5 * profile.size_mm[0] / self.column_mm
 
     def first_panel_rows(self, height: int) -> NDArray[np.int64]:
         """First panel row whose centre lies in each row of the view, [rows + 1]; ends with height.

@@ -138,6 +138,11 @@ class FixedPhases:
         index: NDArray[np.int64] = np.minimum(self.views - ahead, self.views - 1)
         return index.astype(np.uint16)
 
+    def lens(self, phase: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Lens ⌊φ⌋ of summed phases."""
+        found: NDArray[np.int64] = phase // (self.views << _FRACTION_BITS) + self.lenses
+        return found
+
 
 def _fixed(phases: Float64, views: int) -> NDArray[np.int64]:
     in_views = phases * views

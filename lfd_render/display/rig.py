@@ -69,6 +69,22 @@ class Rig:
         return _rig(profile, eye_from_slot(slot, profile, spacing))
 
     @staticmethod
+    def jittered(
+        profile: DisplayProfile, views: int, eyes: int, seed: int, spacing: Spacing | None = None
+    ) -> Rig:
+        """Rig of so many eyes a view, one at a random place in each equal part of the view's slot:
+        eye v·eyes + m belongs to view v."""
+        if not 1 <= views * eyes <= MAX_VIEWS:
+            raise UsageError(
+                f"views are {views} of {eyes} eyes; all eyes should be from 1 to {MAX_VIEWS}"
+            )
+        count = views * eyes
+        # numpy keeps the numbers of this generator for all time.
+        place = np.random.RandomState(seed & 0xFFFFFFFF).random_sample(count)
+        slot = (np.arange(count) + place) / count - 0.5
+        return _rig(profile, eye_from_slot(slot, profile, spacing))
+
+    @staticmethod
     def single(profile: DisplayProfile, angle_rad: float) -> Rig:
         """One eye at (D·tan θ, 0, D), θ positive to the viewer's right, |θ| < 90°."""
         check_angle(angle_rad)
@@ -113,14 +129,23 @@ def slot_from_angle(
     Beyond half the cone |x| exceeds ½: the eye sees the neighbouring lens, the views repeat.
     """
     check_angle(angle_rad)
+    eye_mm = np.array(profile.distance_mm * np.tan(angle_rad))
+    return float(slot_from_eye(eye_mm, profile, spacing))
+
+
+def slot_from_eye(
+    eye_x_mm: Float64, profile: DisplayProfile, spacing: Spacing | None = None
+) -> Float64:
+    """Place x under its lens that the eye at (s, 0, D) sees, of each s: `eye_from_slot` undone."""
     half, index = profile.cone_rad / 2, profile.index
     rule = profile.spacing if spacing is None else spacing
+    angle = np.arctan(np.asarray(eye_x_mm) / profile.distance_mm)
     match rule:
         case "lens":
-            inner = np.tan(np.arcsin(np.sin(angle_rad) / index))
-            return float(inner / (2 * np.tan(np.arcsin(np.sin(half) / index))))
+            inner = np.tan(np.arcsin(np.sin(angle) / index))
+            return np.asarray(inner / (2 * np.tan(np.arcsin(np.sin(half) / index))))
         case "angle":
-            return angle_rad / (2 * half)
+            return np.asarray(angle / (2 * half))
         case "tangent":
-            return float(np.tan(angle_rad) / (2 * np.tan(half)))
+            return np.asarray(np.tan(angle) / (2 * np.tan(half)))
     assert_never(rule)

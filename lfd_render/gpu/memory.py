@@ -152,7 +152,7 @@ def _bytes(array: NDArray[Any]) -> NDArray[np.uint8]:
     return np.ascontiguousarray(array).reshape(-1).view(np.uint8)
 
 
-_BYTES_PER_TEXEL = {gl.RGBA8: 4, gl.SRGB8_ALPHA8: 4, gl.RGBA16F: 8, gl.RGBA32F: 16}
+_BYTES_PER_TEXEL = {gl.RGBA8: 4, gl.SRGB8_ALPHA8: 4, gl.RGBA16F: 8, gl.RG32UI: 8, gl.RGBA32F: 16}
 
 
 class TextureArray(Owned):
@@ -287,12 +287,13 @@ class TableTexture(Owned):
     faster than from storage blocks."""
 
     def __init__(self, device: Device, label: str, words: NDArray[np.uint32]) -> None:
-        """words: uint32 [n, 4], n at most the device's texture size."""
-        assert words.shape == (len(words), 4)
+        """words: uint32 [n, 4] or [row, n, 4], n at most the device's texture size."""
+        rows, count = (1, *words.shape[:1]) if words.ndim == 2 else words.shape[:2]
+        assert words.shape[-1] == 4
         limit = device.info.max_texture_size
-        if len(words) > limit:
+        if max(rows, count) > limit:
             raise ResourceError(
-                f"table '{label}': {len(words)} entries exceed the {limit} texels of "
+                f"table '{label}': {count} entries exceed the {limit} texels of "
                 f"{device.name}; use a display of fewer pixels a side"
             )
         self.label = label
@@ -304,9 +305,9 @@ class TableTexture(Owned):
         raw.glCreateTextures(gl.TEXTURE_2D, 1, ctypes.byref(name))
         self.name = int(name.value)
         data = np.ascontiguousarray(words)
-        raw.glTextureStorage2D(self.name, 1, gl.RGBA32UI, len(words), 1)
+        raw.glTextureStorage2D(self.name, 1, gl.RGBA32UI, count, rows)
         raw.glTextureSubImage2D(
-            self.name, 0, 0, 0, len(words), 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, data.ctypes.data
+            self.name, 0, 0, 0, count, rows, gl.RGBA_INTEGER, gl.UNSIGNED_INT, data.ctypes.data
         )
         raw.glTextureParameteri(self.name, gl.TEXTURE_MIN_FILTER, gl.NEAREST)
         raw.glTextureParameteri(self.name, gl.TEXTURE_MAG_FILTER, gl.NEAREST)

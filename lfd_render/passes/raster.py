@@ -49,6 +49,7 @@ class RasterForward:
                 {
                     "ALPHA_TESTED": int(alpha_mode != "opaque"),
                     "BLENDED": int(alpha_mode == "blend"),
+                    "MARGIN_COLUMNS": max(2, target.grid.fineness),
                     **scene.constants(),
                     **scene.lighting.constants(),
                     **lod_constants(lod),

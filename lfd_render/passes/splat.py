@@ -122,7 +122,7 @@ def pixel_matrices(rig: Rig, grid: ViewGrid) -> tuple[NDArray[np.float32], NDArr
     Returns float32 [view, 16] as GLSL lays a mat4 out, and int32 [row]: a matrix's column less the
     stored one, which steps with the lenses where the view follows them.
     """
-    shifts = (grid.row_base - grid.row_base[0]).astype(np.int32)
+    shifts = (grid.row_base - grid.row_base[0]).astype(np.int32) * grid.fineness
     offsets = grid.row_offset + shifts
     slope = float(offsets[-1] - offsets[0]) / max(grid.rows - 1, 1)
     start = float(offsets[0]) - 0.5 * slope

@@ -23,12 +23,28 @@ MOST_BAND_ROWS = 1000  # with at most 4 Mi triangles a batch, items stay below 2
 
 
 @dataclass(frozen=True, eq=False)
+class ViewImages:
+    """Images of all views, [view, row, column], whose row 0 is view row `first`; the panel rows
+    that show the view rows `shown`, [first, end), can be woven from them."""
+
+    images: TextureArray
+    first: int
+    shown: tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
 class Band:
-    """Rows [first, first + rows) of the views of a target."""
+    """Rows [first, first + rows) of the views of a target; the panel takes those in `shown`,
+    [first, end), and a filter what lies around them."""
 
     target: ViewTarget
     first: int
     rows: int
+    shown: tuple[int, int]
+
+    def view_images(self) -> ViewImages:
+        """What of the views this band holds."""
+        return ViewImages(self.target.images, self.first, self.shown)
 
     def frame(self, batch: Batch | None = None) -> Buffer:
         """The Frame block of this band and a batch; of any, for passes that read no triangles."""
@@ -39,23 +55,37 @@ class ViewTarget:
     """Rig, grid and bands, with the view images [view, row of the band, column] in linear light."""
 
     def __init__(
-        self, device: Device, rig: Rig, grid: ViewGrid, batches: Sequence[Batch], seed: int = 0
+        self,
+        device: Device,
+        rig: Rig,
+        grid: ViewGrid,
+        batches: Sequence[Batch],
+        seed: int = 0,
+        *,
+        row_step: int = 1,
+        halo: int = 0,
     ) -> None:
+        """row_step: bands hold a multiple of so many rows. halo: rows around those shown, a
+        multiple of it too."""
+        assert grid.rows % row_step == halo % row_step == 0
         self.rig = rig
         self.grid = grid
         row_bytes = 4 * rig.views * grid.columns
-        self.band_rows = min(grid.rows, MOST_BAND_ROWS, BAND_BYTES // row_bytes)
-        if self.band_rows < 1 or max(grid.rows, grid.columns) >= 1 << 16:
+        most = min(MOST_BAND_ROWS, BAND_BYTES // row_bytes)
+        self.band_rows = min(grid.rows, most // row_step * row_step)
+        step = self.band_rows if self.band_rows == grid.rows else self.band_rows - 2 * halo
+        if step < row_step or max(grid.rows, grid.columns) >= 1 << 16:
             raise ResourceError(
                 f"views: {rig.views} views of {grid.columns}×{grid.rows} do not fit the device; "
                 "use fewer or smaller views"
             )
         self.bands = [
-            Band(self, first, min(self.band_rows, grid.rows - first))
-            for first in range(0, grid.rows, self.band_rows)
+            self._band(first, min(first + step, grid.rows), halo)
+            for first in range(0, grid.rows, step)
         ]
         # One row suffices to have a device compile all that a frame will run.
-        self.warm_up_band = Band(self, grid.rows // 2, 1)
+        middle = grid.rows // 2 // row_step * row_step
+        self.warm_up_band = self._band(middle, middle + row_step, 0)
         self.eyes = Buffer.of(device, "rig", (rig.eye_x_mm / grid.column_mm).astype(np.float32))
         self.row_offsets = Buffer.of(device, "rig", grid.row_offset.astype(np.float32))
         self.images = TextureArray(
@@ -69,6 +99,10 @@ class ViewTarget:
             for band in (*self.bands, self.warm_up_band)
             for batch in batches
         }
+
+    def _band(self, first: int, end: int, halo: int) -> Band:
+        start, stop = max(first - halo, 0), min(end + halo, self.grid.rows)
+        return Band(self, start, stop - start, (first, end))
 
     @property
     def band_pixels(self) -> int:

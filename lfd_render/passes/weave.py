@@ -2,113 +2,329 @@
 
 from __future__ import annotations
 
+import time
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
-from lfd_render.display import DisplayProfile, ViewGrid
+from lfd_render.display import DisplayProfile, Reconstruction, ViewGrid
 from lfd_render.gpu import raw as gl
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.framebuffer import LayerTarget
 from lfd_render.gpu.memory import TableTexture, TextureArray
-from lfd_render.gpu.programs import Uniform
+from lfd_render.gpu.programs import Kernel, Samplers, Uniform
 from lfd_render.passes.screen import ScreenPass
-from lfd_render.passes.view_target import Band
+from lfd_render.passes.view_target import Band, ViewImages
+
+NO_ROW = 0xFFFFFFFF
+MOST_INDEXED_VIEWS = 1 << 10  # what places.frag has bits for
+MOST_INDEXED_COLUMNS = 1 << 16
+_TRIAL_ROWS = 64  # of views, woven to find the faster way
+NEAREST = Reconstruction()
 
 
 class Weave:
-    """Band of view images → panel image [y, x, RGBA] in scene-linear half float, row 0 on top.
+    """ViewImages → panel image [y, x, RGBA], row 0 on top, as a Reconstruction has it.
 
-    Each subpixel takes the nearest view at the centre of its lens on its row: the lens's own column
-    where views follow the lenses, linear between two columns where they stand upright.
+    In scene-linear half floats, or encoded, in bytes, from encoded view images. The reference is
+    `reference.woven`.
     """
 
-    def __init__(self, device: Device, profile: DisplayProfile, grid: ViewGrid, views: int) -> None:
+    def __init__(
+        self,
+        device: Device,
+        profile: DisplayProfile,
+        grid: ViewGrid,
+        views: int,
+        rule: Reconstruction = NEAREST,
+        *,
+        encoded: bool = False,
+    ) -> None:
         self._profile = profile
         self._grid = grid
+        kind: type[_Nearest | _Mixed | _Filtered]
+        if rule.aa != "none":
+            kind = _Filtered
+        else:
+            kind = _Nearest if is_exact(rule, grid) and _has_bits(grid, views) else _Mixed
         width, height = profile.resolution_px
-        tables = profile.phase_tables()
-        fixed = tables.fixed(views)
-        columns_per_lens, lens_0 = lens_columns(profile, grid)
-        lens_0 = lens_0 + fixed.lenses * columns_per_lens
-        self._pass = ScreenPass(
-            device,
-            "weave/weave.frag",
-            {
-                "LINEAR_COLUMNS": int(grid.kind == "upright"),
-                "PATTERN_MODE": tables.pattern_mode,
-                "CELL_KINDS": len(tables.cell),
-            },
-        )
-        self._tables = {
-            "column_table": _table(device, _words(fixed.column)),
-            "row_table": _table(
-                device, _words(fixed.row), lens_0.astype(np.float32).view(np.uint32)
-            ),
-        }
-        self._uniforms: dict[str, Uniform] = {
-            "subpixel_phases": _words(fixed.subpixel).tobytes(),
-            "columns_per_lens": columns_per_lens,
-            "panel_px": (width, height),
-        }
-        self.panel = TextureArray(device, "panel image", (width, height, 1), gl.RGBA16F)
+        form = gl.RGBA8 if encoded else gl.RGBA16F
+        self.panel = TextureArray(device, "panel image", (width, height, 1), form)
         self.framebuffer = LayerTarget(device, self.panel, depth=False)
+        self._step: _Step = kind(device, profile, grid, views, rule)
+        if isinstance(self._step, _Nearest):
+            self._step.choose(self.panel, self.framebuffer)
 
-    def __call__(self, band: Band) -> None:
-        """Weave the panel rows that show this band."""
+    def __call__(self, shown: ViewImages | Band) -> None:
+        """Weave the panel rows that show these view rows."""
+        images = shown.view_images() if isinstance(shown, Band) else shown
         width, height = self._profile.resolution_px
         starts = self._grid.first_panel_rows(height)
+        first, end = images.shown
         self.framebuffer.use(0)
-        self._pass(
-            {"FrameBlock": band.frame()},
-            self._uniforms,
-            {**self._tables, "view_images": band.target.images},
-            (int(starts[band.first]), int(starts[band.first + band.rows])),
-            width,
-        )
+        self._step(images, (int(starts[first]), int(starts[end])), width)
 
     def read_linear(self) -> NDArray[np.float16]:
         """The panel image as float16 [y, x, 3]."""
         self.framebuffer.use(0)
         return self.framebuffer.read_rgb(gl.HALF_FLOAT, np.float16).astype(np.float16, copy=False)
 
+    def read_encoded(self) -> NDArray[np.uint8]:
+        """The panel image as uint8 [y, x, 3]."""
+        self.framebuffer.use(0)
+        return self.framebuffer.read_rgb(gl.UNSIGNED_BYTE, np.uint8).astype(np.uint8, copy=False)
+
     def release(self) -> None:
         """Free everything."""
-        for table in self._tables.values():
-            table.release()
+        self._step.release()
         self.framebuffer.release()
         self.panel.release()
+
+
+def is_exact(rule: Reconstruction, grid: ViewGrid) -> bool:
+    """Whether each subpixel shows one view pixel as it is."""
+    at_lens = grid.kind == "lens" and grid.fineness == 1 and rule.lookup == "lens"
+    return at_lens and rule.weave == "nearest" and rule.aa == "none"
+
+
+def _has_bits(grid: ViewGrid, views: int) -> bool:
+    return views <= MOST_INDEXED_VIEWS and grid.columns <= MOST_INDEXED_COLUMNS
+
+
+class _Step(Protocol):
+    def __call__(self, images: ViewImages, rows: tuple[int, int], width: int) -> None: ...
+
+    def release(self) -> None: ...
+
+
+class _Phases:
+    """The tables that give subpixels their phases, and the constants that go with them."""
+
+    def __init__(self, device: Device, profile: DisplayProfile, grid: ViewGrid, views: int) -> None:
+        tables = profile.phase_tables()
+        fixed = tables.fixed(views)
+        height = profile.resolution_px[1]
+        first_lens = (fixed.lenses * views) << 32
+        row_words = _words(fixed.row + first_lens, views)
+        row_words[:, 3] = _word(-grid.row_base[view_rows(grid, height)])
+        self.textures = {
+            "column_table": TableTexture(device, "weave", _words(fixed.column, views)),
+            "row_table": TableTexture(device, "weave", row_words),
+        }
+        kinds = len(tables.cell)
+        cells = _words(fixed.subpixel.reshape(-1), views)[:, :3]
+        self.uniforms: dict[str, Uniform] = {"subpixel_phases": cells.tobytes()}
+        self.constants: dict[str, int | float] = {
+            "PATTERN_MODE": tables.pattern_mode,
+            "CELL_KINDS": kinds,
+            "VIEWS": views,
+            "COLUMNS": grid.columns,
+            "PANEL_ROWS": height,
+            "VIEW_ROWS": grid.rows,
+        }
+
+    def release(self) -> None:
+        for table in self.textures.values():
+            table.release()
+
+
+class _Nearest:
+    """The lens's own column of the nearest view, from a map made once."""
+
+    def __init__(
+        self,
+        device: Device,
+        profile: DisplayProfile,
+        grid: ViewGrid,
+        views: int,
+        _rule: Reconstruction,
+    ) -> None:
+        width, height = profile.resolution_px
+        phases = _Phases(device, profile, grid, views)
+        self._places = TextureArray(device, "weave", (width, height, 1), gl.RG32UI)
+        self._places.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
+        target = LayerTarget(device, self._places, depth=False)
+        make_map = ScreenPass(device, "weave/places.frag", phases.constants)
+        target.use(0)
+        make_map({}, phases.uniforms, phases.textures, (0, height), width)
+        for owner in (target, make_map, phases):
+            owner.release()
+        self._device, self._grid, self._views = device, grid, views
+        self._pass = ScreenPass(device, "weave/nearest.frag", phases.constants)
+        constants = {**phases.constants, "PANEL_COLUMNS": width}
+        self._kernel = Kernel(device, "weave/nearest.comp", constants)
+        self._panel: TextureArray | None = None  # what the kernel stores to, where it is the faster
+
+    def choose(self, panel: TextureArray, framebuffer: LayerTarget) -> None:
+        """Fragments or compute, the faster here: fragments on software devices, where they take
+        0.7 of the time (docs/performance.md); elsewhere what a trial says."""
+        if self._device.info.software:
+            return
+        rows = min(_TRIAL_ROWS, self._grid.rows)
+        size = (self._grid.columns, rows, self._views)
+        trial = TextureArray(self._device, "trial", size, panel.internal_format)
+        trial.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
+        trial.clear((0.0, 0.0, 0.0, 0.0))
+        images = ViewImages(trial, 0, (0, rows))
+        panel_rows = (0, int(self._grid.first_panel_rows(panel.height)[rows]))
+        times = []
+        for target in (None, panel):
+            self._panel = target
+            framebuffer.use(0)
+            times.append(self._time(images, panel_rows, panel.width))
+        self._panel = panel if times[1] < times[0] else None
+        trial.release()
+
+    def _time(self, images: ViewImages, rows: tuple[int, int], width: int) -> float:
+        """Least of a few runs, in seconds."""
+        times = []
+        for _ in range(4):
+            self._device.finish()
+            start = time.perf_counter()
+            self(images, rows, width)
+            self._device.finish()
+            times.append(time.perf_counter() - start)
+        return min(times)
+
+    def __call__(self, images: ViewImages, rows: tuple[int, int], width: int) -> None:
+        samplers: Samplers = {"places": self._places, "view_images": images.images}
+        uniforms: dict[str, Uniform] = {"first_row": images.first}
+        if self._panel is None:
+            self._pass({}, uniforms, samplers, rows, width)
+            return
+        first, end = rows
+        self._panel.bind_image(0)
+        uniforms |= {"first_panel_row": first, "end_panel_row": end}
+        self._kernel.set({}, uniforms, samplers)
+        self._kernel.run((-(-width // 32), -(-(end - first) // 8), 1))
+
+    def release(self) -> None:
         self._pass.release()
+        self._kernel.release()
+        self._places.release()
 
 
-def lens_columns(profile: DisplayProfile, grid: ViewGrid) -> tuple[float, NDArray[np.float64]]:
-    """Where lens k appears in a view: column position = k·columns_per_lens + row_columns[panel y].
+class _Mixed:
+    """Nearest or linear in views and columns, unfiltered."""
 
-    Returns columns_per_lens and row_columns, float64 [panel height]. Lens-aligned: lens k is
-    column k − row_base. Upright: the lens centre at u = (k + ½ + center)/P − v·T.
-    """
+    _shader = "weave/mixed.frag"
+
+    def __init__(
+        self,
+        device: Device,
+        profile: DisplayProfile,
+        grid: ViewGrid,
+        views: int,
+        rule: Reconstruction,
+    ) -> None:
+        assert rule.aa != "none" or grid.fineness == 1
+        self._phases = _Phases(device, profile, grid, views)
+        samples = sample_rows(profile, grid, rule)
+        self._rows = TableTexture(device, "weave", samples)
+        at_lens = rule.lookup == "lens"
+        self._pass = ScreenPass(
+            device,
+            self._shader,
+            {
+                **self._phases.constants,
+                "COLUMNS_PER_LENS": grid.fineness if grid.kind == "lens" else 0,
+                "AT_LENS": int(at_lens),
+                "LINEAR_VIEWS": int(rule.weave == "linear"),
+                "LINEAR_COLUMNS": int(not (at_lens and grid.kind == "lens")),
+                "SAMPLES": len(samples),
+                "NO_ROW": NO_ROW,
+            },
+        )
+        self._uniforms: dict[str, Uniform] = {
+            **self._phases.uniforms,
+            "columns_per_lens": grid.columns_at(profile)[0],
+        }
+
+    def __call__(self, images: ViewImages, rows: tuple[int, int], width: int) -> None:
+        samplers: Samplers = {
+            **self._phases.textures,
+            "row_samples": self._rows,
+            "view_images": images.images,
+        }
+        self._pass({}, {**self._uniforms, "first_row": images.first}, samplers, rows, width)
+
+    def release(self) -> None:
+        self._pass.release()
+        self._rows.release()
+        self._phases.release()
+
+
+class _Filtered(_Mixed):
+    """Gaussian over view pixels, views or both."""
+
+    _shader = "weave/filtered.frag"
+
+    def __init__(
+        self,
+        device: Device,
+        profile: DisplayProfile,
+        grid: ViewGrid,
+        views: int,
+        rule: Reconstruction,
+    ) -> None:
+        super().__init__(device, profile, grid, views, rule)
+        apart = rule.offsets()[:, 2]
+        whole = np.floor(apart)
+        fraction = np.rint((apart - whole) * 2.0**32).astype(np.int64)
+        words = np.stack([_word(whole), _word(fraction)], axis=-1)
+        self._uniforms["view_offsets"] = words.tobytes()
+
+
+def sample_rows(
+    profile: DisplayProfile, grid: ViewGrid, rule: Reconstruction
+) -> NDArray[np.uint32]:
+    """For each sample of a rule and panel row, uint32 [sample, y, 4]: view row, or NO_ROW outside;
+    base and offset (float bits) of weave/columns.glsl, with the sample's columns. Unfiltered, one
+    sample: the offset counts in column centres, or is that of the lens's own column."""
     height = profile.resolution_px[1]
     y = np.arange(height)
-    if grid.kind == "lens":
-        view_row = np.minimum((2 * y + 1) * grid.rows // (2 * height), grid.rows - 1)
-        return 1.0, 0.5 - grid.row_base[view_row].astype(np.float64)
     v = (height - y - 0.5) / height
-    count = profile.lens_count
-    offsets = (0.5 + profile.center) / count - v * profile.drift
-    return grid.columns / count, grid.columns * offsets
+    scale, row_column = grid.columns_at(profile)
+    at_row = (y + 0.5) / height * grid.rows
+    filtered = rule.aa != "none"
+    exact = grid.kind == "lens" and rule.lookup == "lens" and not filtered
+    offsets = rule.offsets()
+    words = np.zeros((len(offsets), height, 4), np.uint32)
+    for sample, (columns, rows, _) in enumerate(offsets):
+        row = np.floor(at_row + rows).astype(np.int64) if filtered else view_rows(grid, height)
+        inside = (row >= 0) & (row < grid.rows)
+        row = np.clip(row, 0, grid.rows - 1)
+        along = profile.center - v * profile.drift * profile.lens_count
+        offset = scale * along + row_column[row] + (columns if filtered else -0.5)
+        base = -grid.row_base[row].astype(np.int64) * grid.fineness
+        if grid.kind == "lens":
+            offset -= base  # which leaves little, so that single precision places it well
+        if exact:
+            offset[:] = 0.0
+        words[sample, :, 0] = np.where(inside, row, NO_ROW)
+        words[sample, :, 1] = _word(base)
+        words[sample, :, 2] = offset.astype(np.float32).view(np.uint32)
+    return words
 
 
-def _words(phases: NDArray[np.int64]) -> NDArray[np.uint32]:
-    """Fixed phases → uint32 [..., 2]: whole views (two's complement), fraction."""
-    words = np.stack([phases >> 32, phases & 0xFFFFFFFF], axis=-1)
-    return (words & 0xFFFFFFFF).astype(np.uint32)
+def view_rows(grid: ViewGrid, height: int) -> NDArray[np.int64]:
+    """View row that each panel row lies in, [height]."""
+    y = np.arange(height, dtype=np.int64)
+    return (2 * y + 1) * grid.rows // (2 * height)
 
 
-def _table(
-    device: Device, phases: NDArray[np.uint32], third: NDArray[np.uint32] | None = None
-) -> TableTexture:
-    """Entries of a phase and, if given, one more word."""
-    words = np.zeros((len(phases), 4), np.uint32)
-    words[:, :2] = phases
-    if third is not None:
-        words[:, 2] = third
-    return TableTexture(device, "weave", words)
+def _words(phases: NDArray[np.int64], views: int) -> NDArray[np.uint32]:
+    """Fixed phases → uint32 [..., 4]: whole lenses (two's complement), views, fraction, 0."""
+    whole = phases >> 32
+    lens = whole // views
+    words = np.zeros((*phases.shape, 4), np.uint32)
+    words[..., 0] = _word(lens)
+    words[..., 1] = whole - lens * views
+    words[..., 2] = _word(phases)
+    return words
+
+
+def _word(values: NDArray[np.integer] | NDArray[np.float64]) -> NDArray[np.uint32]:
+    """The low 32 bits of whole numbers."""
+    return (values.astype(np.int64) & 0xFFFFFFFF).astype(np.uint32)

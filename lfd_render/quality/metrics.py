@@ -16,7 +16,7 @@ _REC709 = np.array([0.2126, 0.7152, 0.0722])
 
 def rmse(a: Pixels, b: Pixels) -> float:
     """Root mean square difference of two pictures in levels, 0 to 255."""
-    _check_alike(a, b)
+    check_alike(a, b)
     return float(np.sqrt(np.mean((a.astype(np.float64) - b) ** 2)))
 
 
@@ -37,7 +37,7 @@ def ssim_luma(a: Pixels, b: Pixels) -> float:
 
     Raises UsageError without scikit-image, PictureError below 11 × 11 pixels.
     """
-    _check_alike(a, b)
+    check_alike(a, b)
     if min(a.shape[:2]) < SSIM_WINDOW:
         raise PictureError(
             f"SSIM: picture is {a.shape[1]} x {a.shape[0]} pixels; it should be at least "
@@ -66,7 +66,8 @@ def _check(picture: Pixels) -> None:
         )
 
 
-def _check_alike(a: Pixels, b: Pixels) -> None:
+def check_alike(a: Pixels, b: Pixels) -> None:
+    """Raise PictureError unless both are pictures of one size."""
     _check(a)
     _check(b)
     if a.shape != b.shape:

@@ -101,7 +101,8 @@ def slice_mm(corners: Float64, rig: Rig, grid: ViewGrid, row: int) -> Float64 | 
         rig.distance_mm - rig.near_mm - np.array([p[2]]),
         rig.distance_mm - rig.near_mm - np.array([q[2]]),
     )
-    reach_mm = 0.5 * grid.panel_mm[0] + MARGIN_COLUMNS * grid.column_mm
+    margin = max(MARGIN_COLUMNS, grid.columns - grid.panel_mm[0] / grid.column_mm)
+    reach_mm = 0.5 * grid.panel_mm[0] + margin * grid.column_mm
     for sign in (1.0, -1.0):  # right of the left side, left of the right side
         at_p, at_q = (_inner(end, sign, reach_mm, rig) for end in (p, q))
         seen = _between(at_p, at_q)

@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lfd_render.display import DisplayProfile
+from lfd_render.display import DisplayProfile, ViewGrid
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
-from lfd_render.passes.encode import Encode
+from lfd_render.panel.stage import PanelOptions, PanelStage
 from lfd_render.passes.placement import Placement
-from lfd_render.passes.weave import Weave
 from lfd_render.techniques import Technique
 
 _FRAMES = 1024  # timed at most
+Progress = Callable[[float], None]  # told the part that is done, 0 to 1
 
 
 @dataclass
@@ -51,45 +51,52 @@ class Timings:
 class PanelFrames:
     """Frames of one technique, from camera to encoded panel image."""
 
-    def __init__(self, device: Device, technique: Technique, display: DisplayProfile) -> None:
+    def __init__(
+        self,
+        device: Device,
+        technique: Technique,
+        display: DisplayProfile,
+        grid: ViewGrid,
+        options: PanelOptions,
+    ) -> None:
         self.technique = technique
         self._device = device
-        target = technique.target
-        self._weave = Weave(device, display, target.grid, target.rig.views)
-        self._encode = Encode(device, *display.resolution_px)
+        self._panel = PanelStage(device, display, grid, technique.target, options)
 
     def warm_up(self, placement: Placement) -> None:
         """Run a little of everything: a software device compiles shaders when they first run."""
         clock = StageClock(self._device)
         self.technique.begin(placement, clock)
         self.technique.warm_up(clock)
-        self._weave(self.technique.target.warm_up_band)
-        self._encode(self._weave.panel, 0, 1.0)
+        self._panel.band(self.technique.target.warm_up_band, clock, 1.0)
+        self._panel.finish(clock, 1.0)
 
-    def run(self, placement: Placement, exposure: float) -> tuple[float, dict[str, float]]:
-        """One frame: its milliseconds, whole and by stage."""
+    def run(
+        self, placement: Placement, exposure: float, progress: Progress
+    ) -> tuple[float, dict[str, float]]:
+        """One frame: its milliseconds, whole and by stage. progress: told the part that is done."""
         complete = False
         while not complete:
             clock = StageClock(self._device)
             self._device.finish()
             start = time.perf_counter()
             self.technique.begin(placement, clock)
-            for band in self.technique.target.bands:
+            bands = self.technique.target.bands
+            for index, band in enumerate(bands):
                 self.technique.render(band, clock)
-                with clock.stage("weave"):
-                    self._weave(band)
-            with clock.stage("encode_srgb"):
-                self._encode(self._weave.panel, 0, exposure)
+                self._panel.band(band, clock, exposure)
+                progress((index + 1) / len(bands))
+            self._panel.finish(clock, exposure)
             self._device.finish()
             elapsed_ms = 1000.0 * (time.perf_counter() - start)
             complete = self.technique.complete()
         return elapsed_ms, clock.stages_ms
 
-    def read(self) -> tuple[NDArray[np.float16], NDArray[np.uint8]]:
-        """The last frame in linear light and encoded."""
-        return self._weave.read_linear(), self._encode.read()
+    def read(self) -> tuple[NDArray[np.float16] | None, NDArray[np.uint8]]:
+        """The last frame in linear light, if asked for, and encoded."""
+        return self._panel.read()
 
     def release(self) -> None:
         """Free everything, the technique included."""
-        for owner in (self.technique, self._weave, self._encode):
+        for owner in (self.technique, self._panel):
             owner.release()

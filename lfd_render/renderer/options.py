@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from lfd_render.display import Reconstruction
 from lfd_render.display.model import Spacing
 from lfd_render.errors import UsageError
 from lfd_render.gpu.layout import LOD_RULES
+from lfd_render.panel.stage import LIGHTS
 from lfd_render.passes.sampling import (
     CULLINGS,
     DEFAULT_SAMPLING,
@@ -24,10 +26,11 @@ from lfd_render.passes.view_buffers import WINNERS
 from lfd_render.scene import Environment
 
 TECHNIQUES = ("lfdpr", "mvr")
-PRESETS = ("default", "paper")
+PRESETS = ("default", "paper", "gold")
 PROJECTIONS = ("shear", "general")
 ENVIRONMENTS = ("studio", "none")
 MOST_VIEWS = 1024
+MOST_SUPERSAMPLES = 16  # each way
 MOST_RADIANCE = 65504.0  # what half floats hold
 
 
@@ -43,9 +46,15 @@ class RenderOptions:
     lod: how textures are filtered, one of LOD_RULES; None: as the preset has it (`lod_rule`).
     lattice, point_source, density, texture_limit, culling, stochastic_culling, shade: the ideas of
     LFDPR, each as `Sampling` says; None: as the preset has them (`sampling`).
-    effort: count what points try and keep in the last frame, which takes about a frame's time."""
+    effort: count what points try and keep in the last frame, which takes about a frame's time.
+    views: how many, or "continuous": each subpixel at its own angle, to 1/16 of a view interval.
+    lookup, weave, aa: how views become the panel image, as `Reconstruction` has it; aa None: as the
+    preset has it (`filter`). aa_light: whether filters average "linear" light or "encoded" pixels.
+    supersample: rendered pixels a view pixel each way, and eyes a view, at random places in its
+    interval by `seed`; averaged, or filtered where aa is spatial. linear: whether `Eia.linear` is
+    asked for; without it nearest views are woven faster."""
 
-    views: int | None = None
+    views: int | Literal["continuous"] | None = None
     view_size: tuple[int, int] | None = None
     technique: str = "lfdpr"
     preset: str = "default"
@@ -68,6 +77,12 @@ class RenderOptions:
     stochastic_culling: bool | None = None
     shade: str | None = None
     effort: bool = False
+    lookup: str = "lens"
+    weave: str = "nearest"
+    aa: str | None = None
+    aa_light: str = "linear"
+    supersample: tuple[int, int] = (1, 1)
+    linear: bool = True
 
     def __post_init__(self) -> None:
         """Check ranges; raises UsageError."""
@@ -89,8 +104,8 @@ class RenderOptions:
             raise UsageError(f"lod 'multiview': mvr has no points that views share; use {others}")
         self._check_sampling()
         self._check_splat()
-        if self.views is not None and not _whole(self.views, MOST_VIEWS):
-            raise UsageError(f"views: {self.views!r} is out of range; use 1 to {MOST_VIEWS}")
+        self._check_views()
+        self._check_panel()
         size = self.view_size
         if size is not None and not (
             isinstance(size, tuple | list)
@@ -176,6 +191,39 @@ class RenderOptions:
                 f"{given[0].replace('_', ' ')} {getattr(self, given[0])!r}: technique "
                 f"'{self.technique}' has no points; use it with lfdpr"
             )
+
+    @property
+    def filter(self) -> str:
+        """The filter in use: the preset's where none is given."""
+        if self.aa is not None:
+            return self.aa
+        return "spatial" if self.preset == "gold" else "none"
+
+    def _check_views(self) -> None:
+        if self.views not in (None, "continuous") and not _whole(self.views, MOST_VIEWS):
+            raise UsageError(
+                f"views: {self.views!r} is out of range; use 1 to {MOST_VIEWS}, or 'continuous'"
+            )
+        samples = self.supersample
+        if not (
+            isinstance(samples, tuple | list)
+            and len(samples) == 2
+            and all(_whole(n, MOST_SUPERSAMPLES) for n in samples)
+        ):
+            raise UsageError(
+                f"supersample: {samples!r} is out of range; use two whole numbers, 1 to "
+                f"{MOST_SUPERSAMPLES}: pixels each way, and eyes a view"
+            )
+        if self.views == "continuous" and samples[1] > 1:
+            raise UsageError(
+                f"supersample: {samples[1]} eyes a view, but continuous views have an eye for "
+                "every angle; use 1"
+            )
+
+    def _check_panel(self) -> None:
+        Reconstruction(self.lookup, self.weave, self.filter)  # which checks them
+        if self.aa_light not in LIGHTS:
+            raise UsageError(f"aa light '{self.aa_light}': unknown; use {' or '.join(LIGHTS)}")
 
     def _check_splat(self) -> None:
         if self.splat not in WINNERS:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from types import TracebackType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,17 +17,24 @@ from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.lighting import EnvironmentMap
 from lfd_render.gpu.scene_buffers import SceneBuffers
-from lfd_render.panel.eia import Eia
+from lfd_render.panel.eia import Eia, eia_metadata
+from lfd_render.panel.quilt import Quilt
+from lfd_render.panel.stage import PanelOptions
+from lfd_render.panel.unweave import Unwoven
+from lfd_render.panel.weaving import check_views, weave_pictures
+from lfd_render.passes.average import Average
 from lfd_render.passes.encode import Encode
 from lfd_render.passes.placement import Placement
 from lfd_render.passes.prefilter import Prefilter
 from lfd_render.passes.view_target import ViewTarget
-from lfd_render.renderer.frames import PanelFrames, Timings
-from lfd_render.renderer.options import MOST_VIEWS, RenderOptions
+from lfd_render.renderer.frames import PanelFrames, Progress, Timings
+from lfd_render.renderer.options import RenderOptions
+from lfd_render.renderer.plan import ViewPlan, plan_panel, plan_views, upright_size
 from lfd_render.renderer.stage import REPEAT_TURN_RAD, Stage, check_frame, check_in_front
 from lfd_render.scene import Environment, Pose, Scene
 from lfd_render.techniques import Lfdpr, Mvr, Technique
 
+MOST_EYES = 2048
 MOST_VIEW_PIXELS = 1 << 32  # of all views together: hours on a processor, and far above any panel
 
 
@@ -76,17 +84,19 @@ class Renderer:
         scene: Scene,
         display: DisplayProfile,
         camera: Camera | None = None,
-        views: int | None = None,
+        views: int | Literal["continuous"] | None = None,
         *,
         pose: Pose | None = None,
+        progress: Progress | None = None,
         **options: Any,
     ) -> Eia:
         """Render a scene into the panel image of a display.
 
         camera: where the display's window stands in the world; None uses the scene's own or frames
         it. views: number of views, the profile's by default. pose: how the scene's nodes stand, by
-        default at rest. options: those of RenderOptions. What the call needed stays ready as a
-        `Stage` for a next call with the same scene, display and options.
+        default at rest. progress: told the part of all frames that is done, 0 to 1. options: those
+        of RenderOptions. What the call needed stays ready as a `Stage` for a next call with the
+        same scene, display and options.
         Raises SceneError, UsageError, ResourceError or GpuError.
         """
         _check_kinds(scene, display, camera, pose)
@@ -97,7 +107,8 @@ class Renderer:
             stage = self._staged(scene, display, camera, choice, pose)
             for index in range(choice.repeat):
                 turn = (index - choice.repeat + 1) * float(REPEAT_TURN_RAD)
-                stage.run(camera.turned(turn), pose, choice)
+                done = partial(_part_done, progress or _ignored, index, choice.repeat)
+                stage.run(camera.turned(turn), pose, choice, done)
             return stage.result(choice)
 
     def stage(
@@ -105,7 +116,7 @@ class Renderer:
         scene: Scene,
         display: DisplayProfile,
         camera: Camera | None = None,
-        views: int | None = None,
+        views: int | Literal["continuous"] | None = None,
         **options: Any,
     ) -> Stage:
         """A scene before a display with everything compiled and allocated, for many frames.
@@ -134,24 +145,25 @@ class Renderer:
         """The stage for these, which may be there already, warmed up by this camera and pose."""
         if self._stage is not None:
             return self._stage
-        rig = display.rig(choice.views, choice.spacing)
-        grid = _grid(display, choice, rig.views)
-        _check_size(grid, rig.views)
+        plan = plan_panel(display, choice)
+        _check_size(plan)
         if pose is None:
-            check_in_front(scene, camera, rig)
+            check_in_front(scene, camera, plan.rig)
         timings = Timings()
         buffers = self._upload(scene, choice, timings)
         buffers.pose(pose)
 
         def compile_all() -> PanelFrames:
-            technique = self._technique(buffers, rig, grid, choice)
-            frames = PanelFrames(self.device, technique, display)
-            frames.warm_up(Placement(camera.display_from_world(rig.panel_mm), choice.background))
+            technique = self._technique(buffers, plan, choice)
+            panel = PanelOptions(plan.rule, plan.eyes, choice.aa_light, choice.linear)
+            frames = PanelFrames(self.device, technique, display, plan.grid, panel)
+            matrix = camera.display_from_world(plan.rig.panel_mm)
+            frames.warm_up(Placement(matrix, choice.background))
             return frames
 
         frames = timings.measure("compile", self.device, compile_all)
         self._stage = Stage(
-            self.device, scene, display, choice,
+            self.device, scene, display, choice, plan,
             camera=camera, buffers=buffers, frames=frames, timings=timings, call=self._call,
         )  # fmt: skip
         return self._stage
@@ -186,32 +198,39 @@ class Renderer:
         """
         _check_kinds(scene, display, camera, pose)
         choice = RenderOptions(views=views, **options)
-        rig = rig or display.rig(choice.views, choice.spacing)
+        if choice.views == "continuous":
+            raise UsageError("views 'continuous': is for panel images; give a number")
+        if rig is not None and choice.supersample[1] > 1:
+            raise UsageError("supersample: eyes of your own cannot be multiplied; use 1 eye a view")
+        size = choice.view_size or upright_size(display, display.views)
+        plan = plan_views(display, choice, rig, size)
         camera = camera or camera_for(scene, display)
         self._end_stage()
         with self._call():
-            return self._views(scene, display, camera, rig, choice, pose=pose)
+            return self._views(scene, display, camera, plan, choice, pose=pose)
 
     def _views(
         self,
         scene: Scene,
         display: DisplayProfile,
         camera: Camera,
-        rig: Rig,
+        plan: ViewPlan,
         choice: RenderOptions,
         *,
         pose: Pose | None,
     ) -> NDArray[np.uint8]:
-        width, height = choice.view_size or upright_size(display, display.views)
-        grid = ViewGrid.upright(display, width, height)
-        _check_size(grid, rig.views)
+        grid = plan.grid
+        _check_size(plan)
         if pose is None:
-            check_in_front(scene, camera, rig)
+            check_in_front(scene, camera, plan.rig)
         buffers = self._upload(scene, choice, Timings())
         buffers.pose(pose)
-        technique = self._technique(buffers, rig, grid, choice)
-        encode = Encode(self.device, grid.columns, technique.target.images.height)
-        pictures = np.empty((rig.views, grid.rows, grid.columns, 3), np.uint8)
+        technique = self._technique(buffers, plan, choice)
+        target = technique.target
+        average = Average(self.device, target, eyes=plan.eyes, times=plan.times)
+        averaged = max(plan.eyes, plan.times) > 1
+        encode = Encode(self.device, grid.columns, target.band_rows // plan.times)
+        pictures = np.empty((plan.views, grid.rows, grid.columns, 3), np.uint8)
         clock = StageClock(self.device)
         technique.begin(
             Placement(camera.display_from_world(display.size_mm), choice.background), clock
@@ -219,14 +238,55 @@ class Renderer:
         technique.warm_up(clock)  # which also makes room for the points of this very placement
         for band in technique.target.bands:
             technique.render(band, clock)
-            for view in range(rig.views):
-                encode(technique.target.images, view, choice.exposure)
-                rows = slice(band.first, band.first + band.rows)
-                pictures[view, rows] = encode.read()[: band.rows]
+            found = average(band) if averaged else band.view_images()
+            rows = slice(*found.shown)
+            for view in range(plan.views):
+                encode(found.images, view, choice.exposure)
+                pictures[view, rows] = encode.read()[: rows.stop - rows.start]
         self.device.check()
-        technique.release()
-        encode.release()
+        for owner in (technique, encode, average):
+            owner.release()
         return pictures
+
+    def weave(
+        self,
+        views: NDArray[np.uint8] | Quilt | Unwoven,
+        display: DisplayProfile,
+        grid: ViewGrid | None = None,
+    ) -> Eia:
+        """Weave pictures of views into the panel image of a display: a quilt, unwoven views, or
+        uint8 [view, y, x, 3] in sRGB, view 0 leftmost, upright unless `grid` says otherwise.
+
+        Between columns of upright views light is mixed; views that follow the lenses keep their
+        very codes. Raises UsageError for arrays that are no views, ResourceError or GpuError.
+        """
+        if not isinstance(display, DisplayProfile):
+            raise UsageError(f"display: {display!r}; give a DisplayProfile, as its load(…) makes")
+        if isinstance(views, Unwoven):
+            grid = views.grid
+        pictures = views if isinstance(views, np.ndarray) else views.views
+        if pictures.ndim != 4:
+            raise UsageError(f"views: shape {list(pictures.shape)}; give uint8 [view, y, x, 3]")
+        grid = grid or ViewGrid.upright(display, pictures.shape[2], pictures.shape[1])
+        check_views(pictures, grid)
+        count = len(pictures)
+        timings = Timings()
+        with self._call():
+            pixels, linear = timings.measure(
+                "weave",
+                self.device,
+                lambda: weave_pictures(self.device, pictures, display, grid),
+            )
+        report = {
+            "views": count,
+            "view_size": [grid.columns, grid.rows],
+            "view_grid": grid.kind,
+            "renderer": self.device.name,
+            "device_bytes": self.device.ledger.peak,
+            "warnings": [],
+            "timings_ms": timings.summary(),
+        }
+        return Eia(pixels, linear, report, eia_metadata(display, count, grid, technique="weave"))
 
     @contextmanager
     def _call(self) -> Iterator[None]:
@@ -287,10 +347,16 @@ class Renderer:
             self._environment_map.release()
             self._environment_map = self._environment = None
 
-    def _technique(
-        self, buffers: SceneBuffers, rig: Rig, grid: ViewGrid, choice: RenderOptions
-    ) -> Technique:
-        target = ViewTarget(self.device, rig, grid, buffers.batches, choice.seed)
+    def _technique(self, buffers: SceneBuffers, plan: ViewPlan, choice: RenderOptions) -> Technique:
+        target = ViewTarget(
+            self.device,
+            plan.rig,
+            plan.rendered,
+            buffers.batches,
+            choice.seed,
+            row_step=plan.times,
+            halo=plan.halo,
+        )
         if choice.technique == "mvr":
             return Mvr(self.device, buffers, target, lod=choice.lod_rule)
         return Lfdpr(
@@ -311,21 +377,12 @@ def camera_for(scene: Scene, display: DisplayProfile) -> Camera:
     return Camera.frame(*scene.bounds(), display)
 
 
-def upright_size(display: DisplayProfile, views: int) -> tuple[int, int]:
-    """Width and height of upright views: one column a lens, all views together as large as the
-    panel."""
-    rows = ViewGrid.default_rows(display, views)
-    width, height = display.resolution_px
-    return max(1, round(width * height / (views * rows))), rows
+def _ignored(part: float) -> None:
+    """Progress that nobody watches."""
 
 
-def _grid(display: DisplayProfile, choice: RenderOptions, views: int) -> ViewGrid:
-    if choice.view_size is not None:
-        return ViewGrid.upright(display, *choice.view_size)
-    rows = ViewGrid.default_rows(display, views)
-    if choice.preset == "paper":
-        return ViewGrid.upright(display, *upright_size(display, views))
-    return (ViewGrid.sheared if choice.technique == "mvr" else ViewGrid.lens)(display, rows)
+def _part_done(progress: Progress, frame: int, frames: int, part: float) -> None:
+    progress((frame + part) / frames)
 
 
 def _check_kinds(scene: object, display: object, camera: object, pose: object = None) -> None:
@@ -340,13 +397,14 @@ def _check_kinds(scene: object, display: object, camera: object, pose: object = 
     check_frame(camera, pose)
 
 
-def _check_size(grid: ViewGrid, views: int) -> None:
+def _check_size(plan: ViewPlan) -> None:
     """Raise ResourceError for more view pixels than anyone waits for."""
-    if views > MOST_VIEWS:
-        raise UsageError(f"views: {views} is out of range; use 1 to {MOST_VIEWS}")
-    pixels = views * grid.columns * grid.rows
+    eyes, grid = plan.rig.views, plan.rendered
+    if eyes > MOST_EYES:
+        raise UsageError(f"views: {eyes} eyes are too many; use at most {MOST_EYES}")
+    pixels = eyes * grid.columns * grid.rows
     if pixels > MOST_VIEW_PIXELS:
         raise ResourceError(
-            f"views: {views} of {grid.columns}×{grid.rows} are {pixels} pixels, more than "
+            f"views: {eyes} of {grid.columns}×{grid.rows} are {pixels} pixels, more than "
             f"{MOST_VIEW_PIXELS}; use fewer or smaller views"
         )

@@ -14,10 +14,11 @@ from lfd_render.display import Camera, DisplayProfile, Rig
 from lfd_render.errors import SceneError, UsageError
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.scene_buffers import SceneBuffers
-from lfd_render.panel.eia import Eia
+from lfd_render.panel.eia import Eia, eia_metadata
 from lfd_render.passes.placement import Placement
-from lfd_render.renderer.frames import PanelFrames, Timings
+from lfd_render.renderer.frames import PanelFrames, Progress, Timings
 from lfd_render.renderer.options import RenderOptions
+from lfd_render.renderer.plan import ViewPlan
 from lfd_render.scene import Pose, Scene
 from lfd_render.techniques import Technique
 
@@ -44,6 +45,7 @@ class Stage:
         scene: Scene,
         display: DisplayProfile,
         choice: RenderOptions,
+        plan: ViewPlan,
         *,
         camera: Camera,
         buffers: SceneBuffers,
@@ -53,6 +55,7 @@ class Stage:
     ) -> None:
         """call: what surrounds each use of the device. The stage owns `frames`, not `buffers`."""
         self.scene, self.display, self.choice = scene, display, choice
+        self._plan = plan
         self.camera = self._last_camera = camera
         self.closed = False
         self._device = device
@@ -83,7 +86,7 @@ class Stage:
         self._check_open()
         check_frame(camera, pose)
         with self._call():
-            return self.run(camera or self.camera, pose, self.choice)
+            return self.run(camera or self.camera, pose, self.choice, lambda _: None)
 
     def read(self) -> Eia:
         """The panel image of the last frame, with the timings of the frames since the last one."""
@@ -109,14 +112,16 @@ class Stage:
             and _fixed(self.choice) == _fixed(choice)
         )
 
-    def run(self, camera: Camera, pose: Pose | None, choice: RenderOptions) -> float:
+    def run(
+        self, camera: Camera, pose: Pose | None, choice: RenderOptions, progress: Progress
+    ) -> float:
         """One frame, inside a call of the renderer, of options that the stage serves."""
-        rig = self._rig
+        rig = self._plan.rig
         if pose is None:
             check_in_front(self.scene, camera, rig)
         self._buffers.pose(pose)
         placement = Placement(camera.display_from_world(rig.panel_mm), choice.background)
-        frame = self._frames.run(placement, choice.exposure)
+        frame = self._frames.run(placement, choice.exposure, progress)
         self._timings.frames.append(frame)
         self._last_camera = camera
         return frame[0]
@@ -127,7 +132,7 @@ class Stage:
             raise UsageError("stage: no frame since the last read; render one first")
         timings, technique = self._timings, self._frames.technique
         linear, pixels = timings.measure("read", self._device, self._frames.read)
-        grid = technique.target.grid
+        plan, grid = self._plan, self._plan.grid
         points = _point_report(technique, choice)
         warnings = list(self._buffers.warnings)
         if choice.technique == "lfdpr" and points["points"] == 0:
@@ -136,9 +141,14 @@ class Stage:
             "technique": choice.technique,
             "preset": choice.preset,
             "lod": choice.lod_rule,
-            "views": self._rig.views,
+            "views": plan.views,
+            "eyes": plan.rig.views,
             "view_size": [grid.columns, grid.rows],
             "view_grid": grid.kind,
+            "lookup": plan.rule.lookup,
+            "weave": plan.rule.weave,
+            "aa": plan.rule.aa,
+            "supersample": list(choice.supersample),
             "triangles": self.scene.triangle_count,
             **points,
             "renderer": self._device.name,
@@ -149,18 +159,22 @@ class Stage:
         }
         self._timings = Timings()
         self._device.check()
-        metadata = {
-            "lfd:profile": self.display.name,
-            "lfd:profile-hash": self.display.hash,
-            "lfd:views": str(self._rig.views),
-            "lfd:technique": choice.technique,
-            "lfd:seed": str(choice.seed),
-        }
+        metadata = eia_metadata(
+            self.display,
+            # As many as `look` takes rows for: where views are more than rows allow, the display's.
+            plan.views if plan.rows_follow_views else self.display.views,
+            grid,
+            technique=choice.technique,
+            preset=choice.preset,
+            lod=choice.lod_rule,
+            seed=choice.seed,
+            exposure=choice.exposure,
+            lookup=plan.rule.lookup,
+            weave=plan.rule.weave,
+            aa=plan.rule.aa,
+            supersample="x".join(map(str, choice.supersample)),
+        )
         return Eia(pixels, linear, report, metadata)
-
-    @property
-    def _rig(self) -> Rig:
-        return self._frames.technique.target.rig
 
     def _check_open(self) -> None:
         if self.closed:

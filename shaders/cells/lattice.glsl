@@ -114,7 +114,7 @@ ivec2 rows_of_box(Box box) {
 int rows_ever_seen(Aligned t, vec2 step_mm, uvec2 cell) {
     Box first = cell_box(t, step_mm, cell, frame.eye_first), last = cell_box(t, step_mm, cell, frame.eye_last);
     ivec2 rows = rows_of_box(first);
-    float half_width = 0.5 * frame.panel_width_mm / frame.column_mm + 2.0;
+    float half_width = 0.5 * frame.panel_width_mm / frame.column_mm + margin_columns();
     bool across = max(first.columns.y, last.columns.y) >= -half_width
         && min(first.columns.x, last.columns.x) <= half_width;
     return across ? max(rows.y - rows.x, 0) : 0;

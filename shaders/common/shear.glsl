@@ -70,11 +70,11 @@ vec2 seen_by_either(vec2 at_p, vec2 at_q) {
     return vec2(min(first.x, last.x), max(first.y, last.y));
 }
 
-// Cut a segment to the near plane and to the union of the eyes' frusta, two columns of margin
+// Cut a segment to the near plane and to the union of the eyes' frusta, some columns of margin
 // outside, so that the cut itself is never inside a view.
 vec2 clip_slice(vec3 p, vec3 q) {
     vec2 ends = positive_part(depth_of(p) - frame.near_mm, depth_of(q) - frame.near_mm);
-    float half_width = 0.5 * frame.panel_width_mm + 2.0 * frame.column_mm;
+    float half_width = 0.5 * frame.panel_width_mm + margin_columns() * frame.column_mm;
     vec2 eyes = vec2(frame.eye_first, frame.eye_last) * frame.column_mm;
     // x_window·d = D·X + (d − D)·s, so the frustum's planes are linear in the point.
     precise vec2 x_p = frame.distance_mm * p.x - p.z * eyes;

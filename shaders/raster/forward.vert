@@ -31,7 +31,7 @@ void main() {
     gl_Position = clip_from_display * vec4(p_display, 1.0);
     float d = frame.distance_mm - p_display.z;
     float x_times_d = frame.distance_mm * p_display.x - p_display.z * eye_mm;
-    float half_width = 0.5 * frame.panel_width_mm + 2.0 * frame.column_mm;  // lenses that begin outside
+    float half_width = 0.5 * frame.panel_width_mm + float(MARGIN_COLUMNS) * frame.column_mm;  // lenses that begin outside
     gl_ClipDistance[0] = x_times_d + half_width * d;
     gl_ClipDistance[1] = half_width * d - x_times_d;
 

@@ -68,7 +68,7 @@ ivec2 rows_seen(vec3 a, vec3 b, vec3 c, Plane plane, uint facing) {
         extend_columns(columns, a);
         extend_columns(columns, b);
         extend_columns(columns, c);
-        float half_width = 0.5 * frame.panel_width_mm / frame.column_mm + 2.0;
+        float half_width = 0.5 * frame.panel_width_mm / frame.column_mm + margin_columns();
         if (columns.x > half_width || columns.y < -half_width) return ivec2(0);
     }
     return ivec2(first, last - first + 1);

@@ -16,6 +16,8 @@ import lfd_render.renderer
 from lfd_render.cli.main import main
 from lfd_render.display import Camera, DisplayProfile
 from lfd_render.panel.eia import Eia
+from lfd_render.panel.quilt import Quilt
+from lfd_render.panel.unweave import Unwoven
 from lfd_render.scene import Scene
 
 PANEL = (192, 108)
@@ -108,6 +110,13 @@ class FakeRenderer:
         count = options["views"] or display.views
         shades = np.arange(count, dtype=np.uint8)[:, None, None, None]
         return np.broadcast_to(shades, (count, 14, 24, 3))
+
+    def weave(self, views: Quilt | Unwoven, display: DisplayProfile) -> Eia:
+        self._record(views=views, display=display)
+        width, height = display.resolution_px
+        pixels = np.full((height, width, 3), 127, np.uint8)
+        report = {"views": len(views.views), "warnings": [], "timings_ms": {"weave": 1.0}}
+        return Eia(pixels, pixels.astype(np.float16), report, {"lfd:profile": display.name})
 
     def _record(self, **call: Any) -> None:
         self.calls.append(call)

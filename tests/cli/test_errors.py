@@ -83,6 +83,34 @@ def test_debug_shows_the_traceback(
         (("views", "x.glb", "-o", "a", "--views", "0"), "--views"),
         (("look", "x.png", "-o", "a.png"), "--angle"),
         (("doctor", "--device", "fast"), "fast"),
+        (("render", "x.glb", "-o", "a.png", "--format", "tif"), "--format"),
+        (("quilt", "x.glb"), "--output"),
+        (
+            ("quilt", "x.glb", "-o", "a", "--tiles", "8"),
+            "--tiles: '8'; give columns x rows, as 8x6",
+        ),
+        (("quilt", "x.glb", "-o", "a", "--size", "big"), "--size"),
+        (
+            ("quilt", "x.glb", "-o", "a", "--quilt", "vision"),
+            "'vision' is not known; give portrait",
+        ),
+        (("quilt", "x.glb", "-o", "a", "--quilt", "go", "--tiles", "8x6"), "leave --tiles"),
+        (("quilt", "x.glb", "-o", "a", "--tiles", "40x40"), "40 x 40 are too many"),
+        (
+            ("quilt", "x.glb", "-o", "a", "--tiles", "8x6", "--size", "99x99"),
+            "99x99 does not divide",
+        ),
+        (("quilt", "x.glb", "-o", "a_qs5x9a1.777.png"), "a_qs5x9a1.777.png: names 5 x 9 views"),
+        (("quilt", "x.glb", "-o", "a.jpg"), "a quilt is written as .png"),
+        (("weave", "x.png"), "--output"),
+        (("weave", "x.png", "-o", "a.tif"), ".png or .exr or .raw"),
+        (("weave", "x.png", "-o", "a.png", "--tiles", "x"), "--tiles"),
+        (("weave", ".", "-o", "a.png", "--tiles", "8x6"), "a folder of views has none"),
+        (("unweave", "x.png"), "or --check-display"),
+        (("unweave", "x.png", "-o", "-"), "give a folder"),
+        (("unweave", "x.png", "-o", "a", "--error-picture", "b.png"), "add --check-display"),
+        (("unweave", "x.png", "--check-display", "y", "--error-picture", "b.tif"), "'.tif'"),
+        (("unweave", "x.png", "-o", "a", "--rows", "0"), "--rows"),
     ],
 )
 def test_usage_errors(
@@ -110,6 +138,12 @@ def test_usage_errors(
         (("render", "builtin:spheres", "-o", "a.png", "-d", "nothing"), 4, "nothing"),
         (("look", "missing.png", "--angle", "0", "-o", "a.png"), 7, "missing.png"),
         (("views", "builtin:spheres", "-o", "no/a"), 8, "no"),
+        (("quilt", "builtin:nothing", "-o", "a"), 3, "nothing"),
+        (("quilt", "builtin:spheres", "-o", "no/a"), 8, "no such folder"),
+        (("weave", "missing_qs8x6a0.75.png", "-o", "a.png"), 7, "missing_qs8x6a0.75.png"),
+        (("weave", ".", "-o", "a.png"), 7, "views.json: No such file"),
+        (("unweave", "missing.png", "-o", "a"), 7, "missing.png"),
+        (("unweave", "missing.png", "-o", "a", "--check-display", "nothing"), 4, "nothing"),
     ],
 )
 def test_bad_input(

@@ -56,6 +56,20 @@ def test_views_differ_by_parallax(scene: Path, display: Path, tmp_path: Path) ->
     assert np.abs(first - last).max() > 50
 
 
+def test_scene_to_quilt_to_panel_image_to_views_and_back(
+    scene: Path, display: Path, tmp_path: Path
+) -> None:
+    made = run("quilt", scene, "-o", "q", "-d", display, "--tiles", "4x2", folder=tmp_path)
+    assert made["output"] == "q_qs4x2a1.77778.png"
+    run("weave", made["output"], "-o", "eia.png", "-d", display, folder=tmp_path)
+    found = run("unweave", "eia.png", "-o", "views", "-d", display, folder=tmp_path)
+    assert (len(found["output"]), found["collisions"]) == (VIEWS, 0)
+    run("weave", "views", "-o", "again.png", "-d", display, folder=tmp_path)
+    woven = read_picture(tmp_path / "eia.png")
+    np.testing.assert_array_equal(read_picture(tmp_path / "again.png"), woven)
+    assert woven.std() > 20  # and there is a picture
+
+
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_an_interrupted_render_leaves_nothing(
     number: signal.Signals, code: int, scene: Path, tmp_path: Path

@@ -39,11 +39,18 @@ def test_options_reach_the_renderer(
     assert call.pop("scene").triangle_count == 1
     assert call.pop("display").name == "small"
     assert renderer.device == "software"
+    assert call.pop("progress") is None  # not long enough for a bar
     assert call == {
         "views": 5,
         "view_size": (30, 20),
         "technique": "mvr",
         "preset": "paper",
+        "lookup": "lens",
+        "weave": "nearest",
+        "aa": None,
+        "aa_light": "linear",
+        "supersample": (1, 1),
+        "linear": False,
         "splat": "auto",
         "spacing": "angle",
         "lod": "long-axis",
@@ -250,9 +257,47 @@ def test_dash_writes_the_picture_to_stdout(
 
 
 @pytest.mark.parametrize(
+    ("output", "options", "kind"),
+    [
+        ("out.exr", (), "exr"),
+        ("out.raw", (), "raw"),
+        ("out", ("--format", "png"), "png"),
+        ("out.png", ("--format", "exr"), "exr"),
+        ("-", ("--format", "raw"), "raw"),
+        ("-", ("--format", "exr"), "exr"),
+    ],
+)
+def test_formats_by_name_or_as_asked(
+    command: Command,
+    scene: Path,
+    display: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    output: str,
+    options: tuple[str, ...],
+    kind: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    stdout = io.TextIOWrapper(io.BytesIO())
+    if output == "-":
+        monkeypatch.setattr(sys, "stdout", stdout)
+    assert command("render", scene, "-o", output, "-d", display, *options).code == 0
+    stdout.seek(0)
+    data = stdout.buffer.read() if output == "-" else (tmp_path / output).read_bytes()
+    starts = {"exr": b"\x76\x2f\x31\x01", "png": b"\x89PNG", "raw": b"\x7f" * 4}
+    assert data.startswith(starts[kind])
+    if kind == "raw":
+        assert len(data) == PANEL[0] * PANEL[1] * 3
+    names = {path.name for path in tmp_path.iterdir()}
+    expected = set() if output == "-" else {output} | ({"out.raw.json"} if kind == "raw" else set())
+    assert names == expected
+
+
+@pytest.mark.parametrize(
     ("output", "code", "words"),
     [
         ("missing/out.png", 8, "no such folder"),
+        ("/dev/null", 8, "is a device"),
         (".", 8, "is a folder"),
         ("/proc/out.png", 8, "/proc"),
         ("out.jpg", 2, ".png"),
@@ -281,3 +326,33 @@ def test_stdout_carries_one_thing(command: Command, scene: Path) -> None:
     result = command("render", scene, "-o", "-", "--json")
     assert result.code == 2
     assert "--json" in result.error
+
+
+def test_panel_options_reach_the_renderer(
+    command: Command, renderer: FakeRenderer, scene: Path, display: Path, tmp_path: Path
+) -> None:
+    result = command(
+        "render", scene, "-o", tmp_path / "out.png", "--display", display, "--views", "continuous",
+        "--lookup", "subpixel", "--aa", "both", "--aa-light", "encoded", "--supersample", "3x1",
+        "--preset", "gold",
+    )  # fmt: skip
+    assert result.code == 0
+    call = renderer.calls[0]
+    assert callable(call["progress"])
+    wanted = {
+        "views": "continuous", "lookup": "subpixel", "aa": "both", "aa_light": "encoded",
+        "supersample": (3, 1), "preset": "gold",
+    }  # fmt: skip
+    assert {name: call[name] for name in wanted} == wanted
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("--supersample", "2by3"), ("--supersample", "0x2"), ("--views", "0"), ("--views", "some")],
+)
+def test_bad_panel_options_are_named(
+    command: Command, scene: Path, display: Path, tmp_path: Path, option: str, value: str
+) -> None:
+    result = command("render", scene, "-o", tmp_path / "a.png", "-d", display, option, value)
+    assert result.code == 2
+    assert f"{option}: '{value}'" in result.error

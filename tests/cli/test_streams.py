@@ -108,10 +108,10 @@ def test_a_full_disk_leaves_no_views(
         (folder / "view_000.png").write_bytes(b"earlier")
     write_png = lfd_render.panel.picture.write_png
 
-    def fills_up(path: Path, pixels: np.ndarray) -> None:
+    def fills_up(path: Path, pixels: np.ndarray, text: dict[str, str]) -> None:
         if "002" in path.name:
             raise OutputError(f"{path}: {os.strerror(errno.ENOSPC)}")
-        write_png(path, pixels)
+        write_png(path, pixels, text)
 
     monkeypatch.setattr(lfd_render.panel.picture, "write_png", fills_up)
     result = command("views", scene, "-o", folder, "-d", display, "--views", 4)

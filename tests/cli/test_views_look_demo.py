@@ -1,10 +1,11 @@
 """`lfd-render views`, `look` and `demo`, with a renderer that renders nothing."""
 
+import re
 from pathlib import Path
 
 import pytest
 
-from lfd_render.panel.picture import read_picture
+from lfd_render.panel.picture import read_picture, read_png_text
 
 from .conftest import PANEL, VIEWS, Command, FakeRenderer
 
@@ -29,6 +30,9 @@ def test_views_are_numbered_from_the_left(
     assert result.json["view_size"] == [24, 14]
     shades = [int(read_picture(folder / name)[0, 0, 0]) for name in names]
     assert shades == list(range(VIEWS))
+    texts = [read_png_text(folder / name) for name in names]
+    assert [text["lfd:view"] for text in texts] == [str(index) for index in range(VIEWS)]
+    assert texts[0]["lfd:profile"] == "small"
 
 
 def test_a_failure_leaves_no_folder(
@@ -76,6 +80,57 @@ def test_look_warns_of_other_figures(
     result = command("look", eia, "--angle", 0, "-o", tmp_path / "a.png", "-d", other)
     assert result.code == 0
     assert "figures differ" in result.stderr
+
+
+def test_look_takes_eyes_pairs_and_sweeps(
+    command: Command, eia: Path, display: Path, tmp_path: Path
+) -> None:
+    look = ("look", eia, "--display", display, "--view-size", "40x30", "--json")
+    out = tmp_path / "seen.png"
+    one = command(*look, "--eye", "12.5,-3,420", "-o", out)
+    assert one.json["eyes_mm"] == [[[12.5, -3, 420]]]
+    pair = command(*look, "--eye", "0,0,420", "--stereo", "--crosstalk", 1, "-o", out)
+    assert pair.json["eyes_mm"] == [[[-32, 0, 420], [32, 0, 420]]]
+    assert read_picture(out).shape == (30, 88, 3)
+    strip = command(*look, "--sweep", "-10:10:3", "--optics", "slab", "-o", out)
+    assert len(strip.json["eyes_mm"]) == 3
+    assert read_picture(out).shape == (30, 136, 3)
+    frames = command(*look, "--sweep", "-10:10:3", "--stereo", "-o", tmp_path / "frames")
+    names = [f"frame_{index:03d}.png" for index in range(3)]
+    assert frames.json["output"] == [str(tmp_path / "frames" / name) for name in names]
+    assert read_picture(tmp_path / "frames" / names[2]).shape == (30, 88, 3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "one of --angle, --eye and --sweep; got none"),
+        (("--angle", 1, "--eye", "0,0,1"), "got --angle and --eye"),
+        (("--angle", 90), "between -90 and 90"),
+        (("--eye", "0,0"), "--eye: '0,0'; give X,Y,Z"),
+        (("--eye", "0,0,-5"), "behind the panel"),
+        (("--sweep", "0:1"), "--sweep: '0:1'; give FROM:TO:N"),
+        (("--sweep", "0:1:1"), "2 to 1000 steps"),
+    ],
+)
+def test_look_names_bad_eyes(
+    command: Command, eia: Path, display: Path, tmp_path: Path, arguments: tuple, message: str
+) -> None:
+    result = command("look", eia, "-d", display, "-o", tmp_path / "a.png", *arguments)
+    assert result.code == 2
+    assert message in result.error
+
+
+def test_a_cone_of_nothing_is_named(
+    command: Command, eia: Path, display: Path, tmp_path: Path
+) -> None:
+    flat = tmp_path / "flat.json"
+    text = display.read_text()
+    flat.write_text(re.sub(r'"cone_deg": [0-9.]+', '"cone_deg": 0', text))
+    result = command("look", eia, "--angle", 0, "-o", tmp_path / "a.png", "-d", flat)
+    assert result.code == 4
+    assert "viewing.cone_deg" in result.error
+    assert "greater than 0" in result.error
 
 
 def test_demo_shows_three_eyes(command: Command, display: Path, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 PACKAGE = "lfd_render"
 
 # Each part and what it may import besides itself.
-_BASE = {"errors", "data"}
+_BASE = {"errors", "data", "version"}
 _GPU = _BASE | {"display", "scene"}
 _PASSES = _GPU | {"gpu"}
 _MIDDLE = _PASSES | {"passes"}
@@ -25,6 +25,7 @@ _RENDERER = _MIDDLE | {"techniques", "panel"}
 _TOP = _RENDERER | {"renderer", "quality", "reference", "__init__"}
 ALLOWED = {
     "errors": set(),
+    "version": set(),
     "data": {"errors"},
     "shaders": set(),
     "display_profiles": set(),

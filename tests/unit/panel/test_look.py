@@ -8,7 +8,7 @@ import pytest
 from lfd_render.display import DisplayProfile, ViewGrid, shipped_profiles
 from lfd_render.display.model import Cells, Panel
 from lfd_render.errors import PictureError, UsageError
-from lfd_render.panel.look import look, nearest_subpixels
+from lfd_render.panel.look import look, look_from, nearest_subpixels, seen_slot
 
 VIEWS = 48
 PAPER = DisplayProfile.load("gavane-2024-tilted-4k")
@@ -72,7 +72,8 @@ def test_beyond_the_cone_the_views_repeat() -> None:
 def test_nearest_subpixels_are_those_of_a_full_search(mode: int | None, z: float) -> None:
     profile = small(PAPER, mode)
     grid = ViewGrid.lens(profile, 5)
-    x, y, miss = nearest_subpixels(profile, grid, z)
+    lens = grid.row_base[:, None] + np.arange(grid.columns)
+    x, y, miss = nearest_subpixels(profile, grid, lens + (1 - z) % 1)
     phase = profile.phase_map()
     view_row = np.floor((np.arange(24) + 0.5) * 5 / 24).astype(int)
     for row, column, c in np.ndindex(miss.shape):
@@ -92,7 +93,8 @@ def test_nearest_subpixels_are_those_of_a_full_search(mode: int | None, z: float
 def test_no_view_is_farther_than_stated_on_the_papers_display() -> None:
     grid = ViewGrid.lens(PAPER, 360)
     for z in (np.arange(0, 24, 5) + 0.5) / VIEWS:
-        *_, miss = nearest_subpixels(PAPER, grid, float(z))
+        lens = grid.row_base[:, None] + np.arange(grid.columns)
+        *_, miss = nearest_subpixels(PAPER, grid, lens + (1 - z) % 1)
         assert miss[:, 2:-2].max() * VIEWS < 0.54  # the outer lenses may be cut off
 
 
@@ -148,3 +150,93 @@ def test_bad_requests_are_named() -> None:
         look(eia, profile, 0.0, size_px=(0, 9))
     with pytest.raises(UsageError, match="views is 0"):
         look(eia, profile, 0.0, views=0)
+
+
+# ---- eyes anywhere ----------------------------------------------------------------------------
+
+ZERO = np.zeros(1)
+
+
+def test_an_eye_on_the_line_of_eyes_is_an_angle() -> None:
+    rng = np.random.default_rng(5)
+    profile = small(PAPER)
+    eia = rng.integers(0, 256, (24, 60, 3)).astype(np.uint8)
+    eye = (profile.distance_mm * math.tan(0.1), 0.0, profile.distance_mm)
+    np.testing.assert_array_equal(look_from(eia, profile, eye), look(eia, profile, 0.1))
+
+
+@pytest.mark.parametrize("optics", ["rig", "slab"])
+def test_small_shifts_follow_the_paraxial_formula(optics: str) -> None:
+    """An eye shift s moves the phase by s·t/(n·D·p_h), displays.md's formula."""
+    gap = 0.5 / math.tan(math.asin(math.sin(PAPER.cone_rad / 2) / PAPER.index))
+    for distance in (600.0, 300.0, 1200.0):
+        moved = seen_slot(PAPER, ZERO, ZERO, (0.5, 0.0, distance), optics)  # type: ignore[arg-type]
+        assert moved[0] == pytest.approx(0.5 * gap / (PAPER.index * distance), rel=1e-5)
+
+
+@pytest.mark.parametrize("optics", ["rig", "slab"])
+def test_moving_along_the_lens_changes_nothing(optics: str) -> None:
+    up = 3.0
+    along = (-up * math.tan(PAPER.tilt_rad), up, 600.0)
+    still = seen_slot(PAPER, ZERO, ZERO, along, optics)  # type: ignore[arg-type]
+    assert still[0] == pytest.approx(0.0, abs=1e-12)
+    raised = seen_slot(PAPER, ZERO, ZERO, (0.0, up, 600.0), optics)  # type: ignore[arg-type]
+    assert abs(raised[0]) > 1e-3
+
+
+def test_optics_agree_at_the_middle_and_differ_at_the_ends_of_the_panel() -> None:
+    eye = (150.0, 0.0, 600.0)
+    x = np.array([0.0, -170.0, 170.0])
+    rig, slab = (seen_slot(PAPER, x, np.zeros(3), eye, optics) for optics in ("rig", "slab"))
+    assert slab[0] == pytest.approx(rig[0], abs=1e-12)
+    # Snell's law is not linear: of 48 views 1.9 off at the far end, 0.1 at the end before the eye.
+    assert np.abs(slab - rig)[1:] * VIEWS == pytest.approx([1.85, 0.13], abs=0.01)
+
+
+def test_a_nearer_eye_sees_other_views_across_the_panel() -> None:
+    levels = np.arange(VIEWS, dtype=np.uint8) * 5
+    eia = levels[PAPER.view_index_map(VIEWS)]
+    seen = look_from(eia, PAPER, (0.0, 0.0, 450.0))[180].astype(float).mean(axis=-1) / 5
+    # The lens at x sees as if from x·(1 − 600/450): the left end from the right.
+    eyes = PAPER.rig(VIEWS).eye_x_mm
+    x = ((np.arange(640) + 0.5) / 640 - 0.5) * 345.4
+    wanted = np.interp(x * (1 - 600 / 450), eyes, np.arange(VIEWS))
+    assert np.abs(seen - wanted)[5:-5].max() < 1.5
+    assert np.abs(seen - wanted[::-1])[5:100].min() > 3  # control: the sign of the shift
+
+
+def test_crosstalk_mixes_neighbouring_views_of_its_colour_alone() -> None:
+    lit = np.where(np.arange(VIEWS) == 24, 255, 0).astype(np.uint8)
+    eia = lit[PAPER.view_index_map(VIEWS)]
+    at = {view: view_angle(PAPER, view) for view in (24, 26, 34)}
+
+    def light(view: int, sigma: float | tuple[float, float, float]) -> np.ndarray:
+        codes = look(eia, PAPER, at[view], sigma_views=sigma)[:, 20:-20] / 255
+        linear = np.where(codes <= 0.04045, codes / 12.92, ((codes + 0.055) / 1.055) ** 2.4)
+        return linear.mean(axis=(0, 1))
+
+    sharp, blurred = light(26, 0.0), light(26, (2.0, 0.0, 2.0))
+    assert sharp.max() < 0.05
+    # Of a Gaussian of σ 2 the view two away has about its density times one view, 0.121.
+    assert blurred[[0, 2]] == pytest.approx([0.121, 0.121], abs=0.02)
+    assert blurred[1] == sharp[1]
+    assert light(34, 2.0).max() < 0.01
+    profile = PAPER.model_copy(
+        update={"response": PAPER.response.model_copy(update={"sigma_views": (2.0, 0.0, 2.0)})}
+    )
+    by_profile = look(eia, profile, at[26])
+    np.testing.assert_array_equal(by_profile, look(eia, PAPER, at[26], sigma_views=(2.0, 0.0, 2.0)))
+
+
+def test_bad_eyes_are_named() -> None:
+    profile = small(PAPER)
+    eia = np.zeros((24, 60, 3), np.uint8)
+    for z in (0.0, -600.0):
+        with pytest.raises(UsageError, match="behind the panel"):
+            look_from(eia, profile, (0.0, 0.0, z))
+    with pytest.raises(UsageError, match="three finite numbers"):
+        look_from(eia, profile, (math.nan, 0.0, 600.0))
+    with pytest.raises(UsageError, match="crosstalk is -1"):
+        look(eia, profile, 0.0, sigma_views=-1.0)
+    with pytest.raises(UsageError, match="optics 'lens'"):
+        look(eia, profile, 0.0, optics="lens")  # type: ignore[arg-type]
