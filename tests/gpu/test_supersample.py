@@ -129,6 +129,7 @@ def test_bands_and_paths_change_nothing(
     whole = renderer.render(scene, small, **options)
     plan = plan_panel(small, RenderOptions(**options))
     rows = 2 * plan.halo + 3 * plan.times
+    renderer.stage(scene, small, **options).close()  # so that the next call makes other bands
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(view_target, "BAND_BYTES", 4 * rows * plan.rig.views * plan.rendered.columns)
         parts = []
