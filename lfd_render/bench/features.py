@@ -77,6 +77,7 @@ class Result:
 
 def copies(scene: Scene, count: int) -> Scene:
     """A scene so many times over, side by side in as many columns as rows, each turned a little."""
+    scene = scene.posed()  # so that no node says where an instance stands
     low, high = scene.bounds()
     spacing = 1.05 * float(np.hypot(*(high - low)[[0, 2]]))
     columns = int(np.ceil(np.sqrt(count)))
@@ -182,12 +183,18 @@ def table(results: Sequence[Result]) -> str:
     return "\n".join(lines)
 
 
+def _size(text: str) -> tuple[int, int]:
+    width, height = (int(side) for side in text.split("x"))
+    return width, height
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command; returns its exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("scenes", nargs="+", metavar="SCENE[*COPIES]")
     parser.add_argument("--device", default="auto")
     parser.add_argument("--views", type=int, default=Study.views)
+    parser.add_argument("--view-size", type=_size, default=Study.view_size, metavar="WxH")
     parser.add_argument("--compared", type=int, default=Study.compared)
     parser.add_argument("--samples", type=int, default=Study.samples)
     parser.add_argument("--rounds", type=int, default=Study.rounds)

@@ -338,6 +338,22 @@ class Scene:
                     )
         for instance in self.instances:
             self._check_deformation(instance)
+        self._check_places()
+
+    def _check_places(self) -> None:
+        """Check that instances on nodes stand where these are at rest: a pose would put them there,
+        whatever their own matrix says. Instances of skins stand where their joints are."""
+        on_nodes = [i for i in self.instances if i.node is not None and i.skin is None]
+        if not on_nodes:
+            return
+        world_from_node = self.nodes.world()
+        for instance in on_nodes:
+            at_rest = world_from_node[instance.node]
+            if not np.allclose(at_rest, instance.world_from_local, rtol=1e-9, atol=0.0):
+                raise SceneError(
+                    f"instance '{instance.name}': world_from_local: differs from where its node "
+                    f"{instance.node} is at rest; give node None, or start from Scene.posed()"
+                )
 
     def _check_deformation(self, instance: Instance) -> None:
         """Check an instance's weights and skin against its mesh."""

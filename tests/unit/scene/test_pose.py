@@ -81,6 +81,16 @@ def posed_mesh(scene: Scene, pose: Pose | None = None) -> Mesh:
     return still.meshes[still.instances[0].mesh]
 
 
+def test_an_instance_stands_where_its_node_does() -> None:
+    """What would be lost as soon as the scene is posed is refused."""
+    scene = arm()
+    moved = replace(scene.instances[0], world_from_local=node_transform((5, 0, 0)))
+    with pytest.raises(SceneError, match="world_from_local: differs from where its node 1 is"):
+        replace(scene, instances=(moved, scene.instances[1]))
+    loose = replace(scene, instances=(replace(moved, node=None), scene.instances[1]))
+    np.testing.assert_array_equal(loose.posed().instances[0].world_from_local[:3, 3], [5, 0, 0])
+
+
 def test_what_hangs_on_a_node_moves_with_it_and_its_parents() -> None:
     scene = arm()
     pose = Pose({"arm": node_transform((1, 0, 0), QUARTER), 1: node_transform((0, 3, 0))})
