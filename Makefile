@@ -21,7 +21,7 @@ demo: system $(VENV)/base.stamp
 	$(BIN)/lfd-render demo out/demo
 
 test: system-test $(VENV)/dev.stamp
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 verify: system-test $(VENV)/dev.stamp
 	LFD_FULL=1 PYTHONPATH=tests $(BIN)/python -m pytest -p verify_page

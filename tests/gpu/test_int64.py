@@ -23,6 +23,7 @@ from lfd_render.passes.view_buffers import INT64_ATOMICS, PackedViewBuffers
 from lfd_render.passes.view_target import ViewTarget
 from lfd_render.renderer import camera_for
 from lfd_render.scene import Instance, Material
+from lfd_render.passes.sampling import Sampling
 from lfd_render.techniques import Lfdpr
 import dataclasses
 
@@ -39,10 +40,10 @@ scene = dataclasses.replace(spheres, materials=materials)
 rig, grid = display.rig(11), ViewGrid.lens(display, 60)
 placement = Placement(camera_for(scene, display).display_from_world(display.size_mm), (0, 0, 0))
 
-def frame(winners, general):
+def frame(winners, general, **sampling):
     buffers = SceneBuffers(device, scene)
     target = ViewTarget(device, rig, grid, buffers.batches)
-    technique = Lfdpr(device, buffers, target, winners=winners, general=general)
+    technique = Lfdpr(device, buffers, target, winners=winners, general=general, sampling=Sampling(**sampling))
     clock = StageClock(device)
     technique.begin(placement, clock)
     technique.warm_up(clock)
@@ -68,6 +69,10 @@ for general in (False, True):
     if not general:
         _, owned, _ = frame("owned", general)
         report["different owned words"] = int((owned != words32).sum())
+        for source in ("compute", "raster"):
+            for winners in ("int64", "two-pass"):
+                _, cells, _ = frame(winners, general, lattice="paper", source=source)
+                report[f"different {source} words by {winners}"] = int((cells != words32).sum())
 print(json.dumps(report))
 """
 
@@ -83,6 +88,9 @@ def test_both_splat_paths_give_the_same_bits(zink: dict[str, str]) -> None:
     assert report["has int64"]
     assert "zink" in report["renderer"]
     assert report["different owned words"] == 0
+    for source in ("compute", "raster"):
+        for winners in ("int64", "two-pass"):
+            assert report[f"different {source} words by {winners}"] == 0
     for general in (False, True):
         found = report[f"general {general}"]
         assert found["packed"] == [
