@@ -15,6 +15,7 @@ import typer
 from lfd_render import __version__
 from lfd_render.cli.console import PROGRAM, say_error
 from lfd_render.cli.demo import demo
+from lfd_render.cli.display import display
 from lfd_render.cli.doctor import doctor
 from lfd_render.cli.look import look
 from lfd_render.cli.quilt import quilt
@@ -37,6 +38,7 @@ app = typer.Typer(
 )
 for command in (render, views, quilt, weave, unweave, look, demo, doctor):
     app.command()(command)
+app.add_typer(display)
 
 
 def _show_version(asked: bool) -> None:

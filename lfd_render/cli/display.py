@@ -1,0 +1,19 @@
+"""`lfd-render display`: what is known of displays, and how it is told to others.
+
+Each sub-command is a function of its own file, `cli/display_*.py`, and hooked in here.
+"""
+
+from __future__ import annotations
+
+import typer
+
+from lfd_render.cli.console import PROGRAM
+from lfd_render.errors import UsageError
+
+display = typer.Typer(name="display", help="Profiles of displays: show, check, convert, measure.")
+
+
+@display.callback(invoke_without_command=True)
+def _group(context: typer.Context) -> None:
+    if context.invoked_subcommand is None:
+        raise UsageError(f"no command given; '{PROGRAM} display --help' lists them")
