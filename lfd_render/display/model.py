@@ -31,22 +31,37 @@ Index = Annotated[float, Field(ge=1, le=4, description="Refractive index of the 
 Offset = Annotated[float, Field(ge=-2, le=2)]
 Sigma = Annotated[float, Field(ge=0, le=MAX_VIEWS)]
 Doubt = Annotated[float, Field(ge=0)]
+Correction = Annotated[float, Field(ge=-4, le=4)]
+CorrectionRow = Annotated[tuple[Correction, ...], Field(min_length=2, max_length=128)]
+FieldPath = Annotated[str, Field(pattern=r"^(panel|lens|viewing|response|correction)(\.\w+)*$")]
+Date = Annotated[
+    str,
+    Field(
+        pattern=r"^\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])$",
+        description="Day of the calibration, as 2024-02-29.",
+    ),
+]
 OffsetXY = tuple[Offset, Offset]
 CellOffsets = tuple[OffsetXY, OffsetXY, OffsetXY]
 Spacing = Literal["lens", "angle", "tangent"]
 
 
 class Stripes(StrictModel):
-    """Three vertical stripes a pixel; `origin` is the one that the phase formula puts at +0."""
+    """Three stripes a pixel; `origin` is the one that the phase formula puts at +0.
+
+    `order` is read to the right, or upwards where the panel stands on its side (`axis`), as the
+    viewer sees it.
+    """
 
     layout: Literal["stripe"] = "stripe"
     order: Literal["rgb", "bgr"] = "rgb"
+    axis: Literal["right", "up"] = "right"
     origin: Literal["red-at-pixel-centre", "green-at-pixel-centre", "blue-at-pixel-centre"] = (
         "red-at-pixel-centre"
     )
 
     def offsets_px(self) -> tuple[float, float, float]:
-        """Distance of R, G and B from the origin stripe, in pixels to the right."""
+        """Distance of R, G and B from the origin stripe along `axis`, in pixels."""
         origin = self.order.index(self.origin[0])
         red, green, blue = ((self.order.index(c) - origin) / 3 for c in "rgb")
         return red, green, blue
@@ -60,12 +75,24 @@ class Cells(StrictModel):
     offsets_px: Annotated[tuple[CellOffsets, ...], Field(min_length=1, max_length=16)]
 
 
+class Mount(StrictModel):
+    """How the picture that the panel takes lies, against what the viewer sees.
+
+    What the viewer sees is flipped, then turned counter-clockwise, to become the panel's picture.
+    """
+
+    rotation_deg: Literal[0, 90, 180, 270] = 0
+    flip_x: bool = False
+    flip_y: bool = False
+
+
 class Panel(StrictModel):
-    """The flat screen."""
+    """The flat screen, as the viewer sees it: width before height, x to the right."""
 
     resolution_px: tuple[Pixels, Pixels]
     size_mm: tuple[Millimetres, Millimetres]
     subpixels: Annotated[Stripes | Cells, Field(discriminator="layout")] = Stripes()
+    mount: Mount | None = None
 
 
 class Lens(StrictModel):
@@ -80,10 +107,14 @@ class Lens(StrictModel):
 
 def _one_of_each(schema: dict[str, Any]) -> None:
     """Say in the JSON Schema what `resolve_lens` asks for."""
-    schema["dependentRequired"] = {"pitch_mm": ["gap_mm"]}
+    schema["dependentRequired"] = {"pitch_mm": ["gap_mm"], "physical_lens_count": ["gap_mm"]}
     schema["allOf"] = [
         {"anyOf": [{"required": ["drift"]}, {"required": ["tilt_deg"]}]},
-        {"anyOf": [{"required": ["lens_count"]}, {"required": ["pitch_mm"]}]},
+        {
+            "anyOf": [
+                {"required": [name]} for name in ("lens_count", "pitch_mm", "physical_lens_count")
+            ]
+        },
     ]
 
 
@@ -93,6 +124,9 @@ class LensStatement(StrictModel, json_schema_extra=_one_of_each):
     lens_count: LensCount | None = None
     pitch_mm: Annotated[
         Millimetres | None, Field(description="Lens pitch across the axis; needs gap_mm.")
+    ] = None
+    physical_lens_count: Annotated[
+        LensCount | None, Field(description="Lenses of the sheet itself; needs gap_mm.")
     ] = None
     drift: Drift | None = None
     tilt_deg: Annotated[
@@ -111,6 +145,9 @@ class Viewing(StrictModel):
     cone_deg: Annotated[float, Field(gt=0, lt=180)]
     distance_mm: Annotated[float, Field(gt=0, le=1e6)]
     spacing: Spacing = "lens"
+    inverted: Annotated[
+        bool, Field(description="The views run the other way under a lens: z = frac φ.")
+    ] = False
 
 
 class Response(StrictModel):
@@ -120,12 +157,30 @@ class Response(StrictModel):
     sigma_views: tuple[Sigma, Sigma, Sigma] = (0.0, 0.0, 0.0)
 
 
+class PhaseCorrection(StrictModel):
+    """What a panel's phase has over the formula, smooth over the panel.
+
+    `phase_lenses` [row][column], top row first, stand at points spread evenly from corner to corner
+    of the panel; between them it is bilinear, taken at pixel centres.
+    """
+
+    phase_lenses: Annotated[tuple[CorrectionRow, ...], Field(min_length=2, max_length=128)]
+
+
+class FieldSource(StrictModel):
+    """Where one field's value comes from."""
+
+    field: FieldPath
+    source: Text
+
+
 class Provenance(StrictModel):
     """Where the numbers come from, and which of them are assumptions."""
 
     source: Annotated[str, Field(max_length=2000)] = ""
     template: bool = False
     assumed: tuple[Text, ...] = ()
+    fields: tuple[FieldSource, ...] = ()
 
 
 class Uncertainty(StrictModel):
@@ -138,6 +193,9 @@ class Uncertainty(StrictModel):
     gap_mm: Doubt | None = None
     cone_deg: Doubt | None = None
     distance_mm: Doubt | None = None
+    offsets_px: Doubt | None = None
+    sigma_views: Doubt | None = None
+    phase_lenses: Doubt | None = None
 
 
 class ProfileFields(StrictModel):
@@ -146,10 +204,11 @@ class ProfileFields(StrictModel):
     schema_: Annotated[Literal["lfd-display/1"], Field(alias="schema")]
     name: Text
     serial: Text | None = None
-    date: Text | None = None
+    date: Date | None = None
     panel: Panel
     viewing: Viewing
     response: Response = Response()
+    correction: PhaseCorrection | None = None
     provenance: Provenance = Provenance()
     uncertainty: Uncertainty | None = None
 
@@ -176,17 +235,10 @@ def resolve_lens(file: ProfileFile, source: str) -> Lens:
     if drift is None:
         raise ProfileError(f"{source}: lens.drift is missing; add lens.drift or lens.tilt_deg")
 
+    others = _other_counts(file, drift, source)
     lens_count = lens.lens_count
-    if lens.pitch_mm is not None:
-        if lens.gap_mm is None:
-            raise ProfileError(
-                f"{source}: lens.gap_mm is missing; lens.pitch_mm needs it to find the lens count "
-                "that the eye sees"
-            )
-        period_mm = lens.pitch_mm * math.hypot(1.0, drift * width_mm / height_mm)  # p⊥/cos α
-        seen_mm = period_mm * (1 + lens.gap_mm / (lens.index * file.viewing.distance_mm))
-        pitched = width_mm / seen_mm
-        lens_count = pitched if lens_count is None else lens_count
+    if lens_count is None and others:
+        lens_count = next(iter(others.values()))
     if lens_count is None:
         raise ProfileError(
             f"{source}: lens.lens_count is missing; add it, or lens.pitch_mm with lens.gap_mm"
@@ -196,9 +248,10 @@ def resolve_lens(file: ProfileFile, source: str) -> Lens:
     if lens.tilt_deg is not None:
         apart = abs(tilted - drift) * lens_count * views
         _check_agreement(source, f"tilt_deg {lens.tilt_deg}", f"drift {drift}", apart)
-    if lens.pitch_mm is not None:
-        apart = abs(pitched - lens_count) * views
-        _check_agreement(source, f"pitch_mm {lens.pitch_mm}", f"lens_count {lens_count}", apart)
+    for field, count in others.items():
+        apart = abs(count - lens_count) * views
+        stated = f"{field} {getattr(lens, field)}"
+        _check_agreement(source, stated, f"lens_count {lens_count}", apart)
     if not 1 <= lens_count <= file.panel.resolution_px[0]:
         raise ProfileError(
             f"{source}: lens.lens_count is {lens_count}; it should be at least 1 and at most "
@@ -206,6 +259,49 @@ def resolve_lens(file: ProfileFile, source: str) -> Lens:
         )
     return Lens(
         lens_count=lens_count, drift=drift, center=lens.center, index=lens.index, gap_mm=lens.gap_mm
+    )
+
+
+def _other_counts(file: ProfileFile, drift: float, source: str) -> dict[str, float]:
+    """Lens count that the eye sees, of each field that says it otherwise, by the field's name."""
+    lens = file.lens
+    width_mm, height_mm = file.panel.size_mm
+    counts: dict[str, float] = {}
+    for field in ("pitch_mm", "physical_lens_count"):
+        if getattr(lens, field) is not None and lens.gap_mm is None:
+            raise ProfileError(
+                f"{source}: lens.gap_mm is missing; lens.{field} needs it to find the lens count "
+                "that the eye sees"
+            )
+    if lens.gap_mm is None:
+        return counts
+    wider = 1 + lens.gap_mm / (lens.index * file.viewing.distance_mm)
+    if lens.pitch_mm is not None:
+        period_mm = lens.pitch_mm * math.hypot(1.0, drift * width_mm / height_mm)  # p⊥/cos α
+        _check_unit(source, lens.pitch_mm, width_mm / period_mm, file.panel.resolution_px[0])
+        counts["pitch_mm"] = width_mm / (period_mm * wider)
+    if lens.physical_lens_count is not None:
+        counts["physical_lens_count"] = lens.physical_lens_count / wider
+    return counts
+
+
+# What a pitch may have been meant in, in millimetres.
+_UNITS_MM = {"metres": 1000.0, "centimetres": 10.0, "micrometres": 1e-3}
+
+
+def _check_unit(source: str, pitch_mm: float, count: float, width_px: int) -> None:
+    """Raise ProfileError for a pitch that makes no lens sheet, naming the unit it may be in."""
+    if 1 <= count <= width_px:
+        return
+    meant = [
+        f"in {unit} it would be {pitch_mm * factor:g} mm"
+        for unit, factor in _UNITS_MM.items()
+        if 8 <= count / factor <= width_px / 2
+    ]
+    raise ProfileError(
+        f"{source}: lens.pitch_mm is {pitch_mm:g}, which makes {count:.6g} lenses across; "
+        f"it should be in millimetres, from 1 lens to {width_px}, one a pixel"
+        + "".join(f"; {text}" for text in meant[:1])
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import difflib
 import functools
 import hashlib
@@ -17,6 +18,7 @@ from pydantic import Field, ValidationError, model_validator
 from lfd_render.data import data_folder
 from lfd_render.display.files import replacing
 from lfd_render.display.looking_glass import is_visual_json, profile_data
+from lfd_render.display.migration import to_present
 from lfd_render.display.model import (
     KINDS_OF_MODE,
     MAX_VIEWS,
@@ -32,6 +34,8 @@ from lfd_render.display.phase import PhaseTables, phase_tables
 from lfd_render.display.rig import Rig
 from lfd_render.display.strict import one_line, read_json_text
 from lfd_render.errors import ProfileError, UsageError
+
+LEAST_PIXEL_MM = 0.001  # of microdisplays they are four times as wide
 
 
 class DisplayProfile(ProfileFields):
@@ -61,6 +65,22 @@ class DisplayProfile(ProfileFields):
                     f"panel.subpixels.offsets_px has {len(subpixels.offsets_px)} cells; pattern "
                     f"mode {subpixels.pattern_mode} needs {kinds}"
                 )
+        rows = self.correction.phase_lenses if self.correction else ((),)
+        for number, row in enumerate(rows):
+            if len(row) != len(rows[0]):
+                raise ValueError(
+                    f"correction.phase_lenses.{number} has {len(row)} columns; it should have "
+                    f"{len(rows[0])}, as the first row"
+                )
+        pixel_mm = min(mm / px for mm, px in zip(self.size_mm, self.resolution_px, strict=True))
+        if pixel_mm < LEAST_PIXEL_MM:
+            raise ValueError(
+                f"panel.size_mm is {list(self.size_mm)}, which makes pixels of {pixel_mm:.3g} mm; "
+                "it should be in millimetres"
+                + (", and looks like metres" if 0.02 < 1000 * pixel_mm < 20 else "")
+            )
+        if self.date is not None:
+            _check_date(self.date)
         return self
 
     @staticmethod
@@ -81,6 +101,8 @@ class DisplayProfile(ProfileFields):
             raise ProfileError(f"{source}: is not valid JSON: {cause}; correct the file") from cause
         if is_visual_json(data):
             text = json.dumps(profile_data(text, source))
+        elif isinstance(data, dict) and data.get("schema", SCHEMA) != SCHEMA:
+            text = json.dumps(to_present(data, source))
         try:
             file = ProfileFile.model_validate_json(text)
             fields = {name: getattr(file, name) for name in ProfileFields.model_fields}
@@ -172,9 +194,52 @@ class DisplayProfile(ProfileFields):
     def hash(self) -> str:
         """16 hexadecimal digits of everything that can change a picture; stable over versions."""
         parts = self.model_dump(
-            mode="json", include={"panel", "lens", "viewing", "response"}, exclude_none=True
+            mode="json",
+            include={"panel", "lens", "viewing", "response", "correction"},
+            exclude_none=True,
         )
-        return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
+        # What was added to the format since counts only where it says something.
+        for section, field, plain in _HASHED_IF_OTHER:
+            part = parts[section]["subpixels"] if field == "axis" else parts[section]
+            if part.get(field) == plain:
+                del part[field]
+        text = json.dumps(_without_signs(parts), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    @property
+    def physical_lens_count(self) -> float | None:
+        """Lenses of the sheet itself across the panel, P·(1 + t/(n·D)); None without a gap."""
+        gap = self.lens.gap_mm
+        return (
+            None if gap is None else self.lens_count * (1 + gap / (self.index * self.distance_mm))
+        )
+
+    @property
+    def pitch_mm(self) -> float | None:
+        """p⊥, the sheet's lens pitch across the lens axis; None without a gap."""
+        count = self.physical_lens_count
+        return None if count is None else self.size_mm[0] / count * math.cos(self.tilt_rad)
+
+    def at_distance(self, distance_mm: float) -> DisplayProfile:
+        """The same panel for eyes at another distance, by P_eff = P/(1 + t/(n·D)).
+
+        The lattice that the eye sees grows about the panel's middle, whose phase stays. Raises
+        ProfileError without `lens.gap_mm`, UsageError for a distance that is none.
+        """
+        if self.lens.gap_mm is None:
+            raise ProfileError(
+                f"display '{self.name}': lens.gap_mm is missing; the count of another distance "
+                "needs it"
+            )
+        if not 0 < distance_mm < math.inf:
+            raise UsageError(f"distance is {distance_mm} mm; it should be above 0")
+        sheet = self.physical_lens_count
+        assert sheet is not None
+        count = sheet / (1 + self.lens.gap_mm / (self.index * distance_mm))
+        grown = (count - self.lens_count) * (0.5 + 0.5 * self.drift)
+        lens = self.lens.model_copy(update={"lens_count": count, "center": self.center + grown})
+        viewing = self.viewing.model_copy(update={"distance_mm": float(distance_mm)})
+        return self.model_copy(update={"lens": lens, "viewing": viewing})
 
     def phase_tables(self) -> PhaseTables:
         """Column, row and cell tables whose sum is the phase of a subpixel."""
@@ -194,6 +259,26 @@ class DisplayProfile(ProfileFields):
     def rig(self, views: int | None = None, spacing: Spacing | None = None) -> Rig:
         """The cameras that this display asks for; the profile's views and spacing by default."""
         return Rig.of(self, views, spacing)
+
+
+# Section, field and the value that says nothing.
+_HASHED_IF_OTHER = (("panel", "axis", "right"), ("viewing", "inverted", False))
+
+
+def _without_signs(value: Any) -> Any:
+    """The same with 0.0 for −0.0, which equals it."""
+    if isinstance(value, dict):
+        return {key: _without_signs(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [_without_signs(part) for part in value]
+    return 0.0 if isinstance(value, float) and value == 0 else value
+
+
+def _check_date(text: str) -> None:
+    try:
+        datetime.date.fromisoformat(text)
+    except ValueError as cause:
+        raise ValueError(f"date is {text!r}; it should be a day that was, as 2024-02-29") from cause
 
 
 @functools.cache

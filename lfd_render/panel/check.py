@@ -1,7 +1,8 @@
 """What a wrong profile costs: by how many views each subpixel of a display driven by it is off.
 
 A subpixel at phase φ under its lens is seen by the eye at z = 1 − frac φ. Woven for phase φ' it
-holds the view of z' instead, N·(z' − z) views from its own, the shorter way round the cone.
+holds the view of z' instead, N·(z' − z) views from its own, the shorter way round the cone. (Where
+views are inverted z is frac φ.)
 """
 
 from __future__ import annotations
@@ -83,13 +84,14 @@ def view_errors(profile: DisplayProfile, other: DisplayProfile, views: int) -> V
         )
     width, height = profile.resolution_px
     true, wrong = profile.phase_tables(), other.phase_tables()
+    sign, other_sign = (-1 if tables.inverted else 1 for tables in (true, wrong))
     step = max(1, -(-max(width, height) // PICTURE_PX))
     total = squares = largest = 0.0
     beyond = 0
     picture_rows = []
     for start in range(0, height, _BLOCK_ROWS):
         part = slice(start, min(start + _BLOCK_ROWS, height))
-        error = _wrapped(true.phase(part) - wrong.phase(part)) * views
+        error = _wrapped(sign * true.phase(part) - other_sign * wrong.phase(part)) * views
         total += float(error.sum())
         squares += float(np.square(error).sum())
         largest = max(largest, float(np.abs(error).max()))
@@ -99,9 +101,8 @@ def view_errors(profile: DisplayProfile, other: DisplayProfile, views: int) -> V
 
     def at(x: int, y: int) -> float:
         where = np.array([[x]]), np.array([[y]])
-        difference = true.phase_at(where[0][..., None], where[1][..., None]) - wrong.phase_at(
-            where[0][..., None], where[1][..., None]
-        )
+        here = where[0][..., None], where[1][..., None]
+        difference = sign * true.phase_at(*here) - other_sign * wrong.phase_at(*here)
         return float(_wrapped(difference)[0, 0, 1]) * views
 
     ends = [(0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1)]
@@ -114,8 +115,8 @@ def view_errors(profile: DisplayProfile, other: DisplayProfile, views: int) -> V
         {name: at(*end) for name, end in zip(CORNERS, ends, strict=True)},
         at(width // 2, height // 2),
         (
-            other.lens_count - profile.lens_count,
-            other.lens_count * other.drift - profile.lens_count * profile.drift,
+            other_sign * other.lens_count - sign * profile.lens_count,
+            other_sign * other.lens_count * other.drift - sign * profile.lens_count * profile.drift,
         ),
     )
 

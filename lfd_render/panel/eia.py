@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.display import DisplayProfile, ViewGrid
+from lfd_render.display.model import Mount
+from lfd_render.display.mount import seen, stored, stored_size
 from lfd_render.errors import OutputError, PictureError
 from lfd_render.panel.formats import FORMATS, format_of, write_exr, write_raw
 from lfd_render.panel.picture import read_picture_file, write_png
@@ -21,12 +23,14 @@ from lfd_render.version import __version__
 class Eia:
     """A panel image. pixels: uint8 [y, x, 3], sRGB; linear: float16 [y, x, 3], scene-linear light
     before exposure and tone curve, None where it was not asked for; report: what was rendered, how,
-    and how long it took; metadata: what its files carry, by keyword."""
+    and how long it took; metadata: what its files carry, by keyword; mount: how the panel takes it,
+    which its files follow."""
 
     pixels: NDArray[np.uint8]
     linear: NDArray[np.float16] | None
     report: dict[str, Any] = field(default_factory=dict)
     metadata: dict[str, str] = field(default_factory=dict)
+    mount: Mount | None = None
 
     def save(self, path: str | Path, format: str | None = None) -> None:
         """Write a PNG or raw bytes of `pixels`, or an EXR of `linear`, with the metadata.
@@ -39,13 +43,13 @@ class Eia:
             raise OutputError(f"{path}: format '{format}': unknown; use {', '.join(FORMATS)}")
         match format or format_of(path):
             case "png":
-                write_png(path, self.pixels, self.metadata)
+                write_png(path, stored(self.pixels, self.mount), self.metadata)
             case "exr":
                 if self.linear is None:
                     raise OutputError(f"{path}: linear light was not asked for; give .png or .raw")
-                write_exr(path, self.linear, self.metadata)
+                write_exr(path, stored(self.linear, self.mount), self.metadata)
             case "raw":
-                write_raw(path, self.pixels, self.metadata)
+                write_raw(path, stored(self.pixels, self.mount), self.metadata)
 
 
 def eia_metadata(
@@ -69,7 +73,7 @@ def eia_metadata(
 class EiaFile:
     """A panel image read from a file. warnings: what a person should know before trusting it."""
 
-    pixels: NDArray[np.uint8]  # [y, x, 3]
+    pixels: NDArray[np.uint8]  # [y, x, 3], as the viewer sees it
     metadata: dict[str, str]
     warnings: tuple[str, ...]
 
@@ -93,7 +97,8 @@ def read_eia(path: str | Path, display: DisplayProfile) -> EiaFile:
     Raises PictureError for a file that is no picture, or none of the display's size.
     """
     file = read_picture_file(path)
-    width, height = display.resolution_px
+    mount = display.panel.mount
+    width, height = stored_size(display.resolution_px, mount)
     found_height, found_width = file.pixels.shape[:2]
     made_for = file.text.get("lfd:profile", "an unnamed display")
     if (found_width, found_height) != (width, height):
@@ -109,4 +114,4 @@ def read_eia(path: str | Path, display: DisplayProfile) -> EiaFile:
             f"{path}: is a JPEG, whose chroma subsampling mixes the views of neighbouring pixels; "
             "a panel image should be kept as PNG"
         )
-    return EiaFile(file.pixels, file.text, tuple(warnings))
+    return EiaFile(seen(file.pixels, mount), file.text, tuple(warnings))

@@ -153,7 +153,8 @@ def seen_phases(
     lens = grid.row_base[:, None] + np.arange(grid.columns)
     x = (np.arange(grid.columns) + 0.5 - grid.row_offset[:, None]) * grid.column_mm
     y = np.broadcast_to(grid.row_mm()[:, None], x.shape)
-    return np.asarray(lens + 0.5 - seen_slot(profile, x, y, eye_mm, optics))
+    slot = seen_slot(profile, x, y, eye_mm, optics)
+    return np.asarray(lens + 0.5 + (slot if profile.viewing.inverted else -slot))
 
 
 def seen_slot(
@@ -194,7 +195,7 @@ def nearest_subpixels(
     lens = np.floor(aim)
     first = grid.first_panel_rows(height)
     step = profile.lens_count / width
-    reach = 1 + int(np.ceil(np.abs(tables.cell).max() / step))
+    reach = 1 + int(np.ceil(tables.reach / step))
 
     shape = (grid.rows, grid.columns, 3)
     best_x, best_y = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
@@ -232,8 +233,7 @@ def _blurred(
     first = grid.first_panel_rows(height)
     step = profile.lens_count / width
     spread = sigma / profile.views
-    cells = np.abs(tables.cell[:, channel]).max()
-    reach = 1 + math.ceil((CUT_SIGMAS * spread + cells) / step)
+    reach = 1 + math.ceil((CUT_SIGMAS * spread + tables.reach) / step)
     total, weights = np.zeros(wanted.shape), np.zeros(wanted.shape)
     for nth in range(int(np.diff(first).max())):
         present = (first[:-1] + nth < first[1:])[:, None]
@@ -246,6 +246,8 @@ def _blurred(
             x = np.clip(x, 0, width - 1)
             kind = 0 if len(tables.cell) == 1 else tables.kind_at(x, y)
             phase = tables.column[x, channel] + tables.row[y] + tables.cell[kind, channel]
+            if tables.correction is not None:
+                phase += tables.correction_at(x, y)
             sigmas = (phase - wanted) / spread
             weight = np.where(inside & (np.abs(sigmas) <= CUT_SIGMAS), np.exp(-0.5 * sigmas**2), 0)
             total += weight * light[y, x]

@@ -141,8 +141,7 @@ def _looked_up(profile: DisplayProfile, views: int, x: Index, y: Index) -> tuple
     """View and lens of the subpixels at columns x and rows y, [y, x, channel] each."""
     tables = profile.phase_tables()
     fixed = tables.fixed(views)
-    kinds = tables.kind_at(x[None, :], y[:, None])
-    phase = fixed.column[None, x, None] + fixed.row[y, None, None] + fixed.subpixel[kinds]
+    phase = tables.fixed_phase(fixed, x, y)
     return fixed.view(phase).astype(np.int64), fixed.lens(phase)
 
 

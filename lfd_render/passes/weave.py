@@ -112,12 +112,17 @@ class _Phases:
             "column_table": TableTexture(device, "weave", _words(fixed.column, views)),
             "row_table": TableTexture(device, "weave", row_words),
         }
+        if tables.correction is not None:
+            correction = _words(tables.fixed_correction(views), views)
+            self.textures["correction_table"] = TableTexture(device, "weave", correction)
         kinds = len(tables.cell)
         cells = _words(fixed.subpixel.reshape(-1), views)[:, :3]
         self.uniforms: dict[str, Uniform] = {"subpixel_phases": cells.tobytes()}
         self.constants: dict[str, int | float] = {
             "PATTERN_MODE": tables.pattern_mode,
             "CELL_KINDS": kinds,
+            "INVERTED": int(tables.inverted),
+            "CORRECTED": int(tables.correction is not None),
             "VIEWS": views,
             "COLUMNS": grid.columns,
             "PANEL_ROWS": height,

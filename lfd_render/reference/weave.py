@@ -70,10 +70,10 @@ def _mixed(
         left = np.floor(column).astype(np.int64)
         across = column - left
     if rule.weave == "nearest":
-        low = high = view_of(phase, len(views))
+        low = high = view_of(phase, len(views), inverted=profile.viewing.inverted)
         between = np.zeros(1)
     else:
-        at = len(views) * (1.0 - (phase - np.floor(phase))) - 0.5  # counted in view centres
+        at = len(views) * _z(phase, profile.viewing.inverted) - 0.5  # counted in view centres
         low = np.floor(at).astype(np.int64)
         between = at - low
         low, high = (np.clip(view, 0, len(views) - 1) for view in (low, low + 1))
@@ -103,7 +103,7 @@ def _filtered(
     height = profile.resolution_px[1]
     count = len(views)
     at_row = (y + 0.5) / height * grid.rows
-    at_view = count * (1.0 - (phase - np.floor(phase)))
+    at_view = count * _z(phase, profile.viewing.inverted)
     total, weight = np.zeros(phase.shape), np.zeros(phase.shape)
     for columns, rows, apart in rule.offsets():
         row = np.floor(at_row + rows).astype(np.int64)
@@ -138,7 +138,12 @@ def columns_of(
     return np.asarray(scale * u_lenses + offset[row])
 
 
-def view_of(phase: Float64, views: int) -> Int:
-    """View of each phase: z = 1 − frac φ, ⌊z·N⌋, at most N − 1; view 0 is the leftmost."""
-    z = 1.0 - (phase - np.floor(phase))
-    return np.minimum(np.floor(z * views).astype(np.int64), views - 1)
+def view_of(phase: Float64, views: int, *, inverted: bool = False) -> Int:
+    """View of each phase: ⌊z·N⌋, at most N − 1; view 0 is the leftmost."""
+    return np.minimum(np.floor(_z(phase, inverted) * views).astype(np.int64), views - 1)
+
+
+def _z(phase: Float64, inverted: bool) -> Float64:
+    """1 − frac φ, or frac φ where views run the other way under a lens."""
+    within: Float64 = phase - np.floor(phase)
+    return within if inverted else 1.0 - within

@@ -286,7 +286,8 @@ class Renderer:
             "warnings": [],
             "timings_ms": timings.summary(),
         }
-        return Eia(pixels, linear, report, eia_metadata(display, count, grid, technique="weave"))
+        metadata = eia_metadata(display, count, grid, technique="weave")
+        return Eia(pixels, linear, report, metadata, display.panel.mount)
 
     @contextmanager
     def _call(self) -> Iterator[None]:

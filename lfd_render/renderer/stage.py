@@ -174,7 +174,7 @@ class Stage:
             aa=plan.rule.aa,
             supersample="x".join(map(str, choice.supersample)),
         )
-        return Eia(pixels, linear, report, metadata)
+        return Eia(pixels, linear, report, metadata, self.display.panel.mount)
 
     def _check_open(self) -> None:
         if self.closed:

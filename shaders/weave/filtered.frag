@@ -14,8 +14,13 @@ uniform uvec2 view_offsets[SAMPLES];  // whole views, signed, and a fraction of 
 
 layout(location = 0) out vec4 panel;
 
-// View that lies so far to the right of a phase, which counts views to the left.
+// View that lies so far to the right of a phase, which counts views to the left, or to the right if INVERTED.
 int offset_view(uvec3 phase, uvec2 offset) {
+    if (INVERTED == 1) {
+        uint sum = phase.z + offset.y;
+        int view = int(phase.y) + int(offset.x) + int(sum < phase.z);
+        return view - int(view == VIEWS && sum == 0u);
+    }
     uint fraction = phase.z - offset.y;
     int slot = int(phase.y) - int(offset.x) - int(phase.z < offset.y);
     // At a phase of 0 exactly the last view ends.

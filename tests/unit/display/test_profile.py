@@ -72,7 +72,7 @@ profiles = st.fixed_dictionaries(
         "panel": st.fixed_dictionaries(
             {
                 "resolution_px": st.tuples(st.integers(600, 8000), st.integers(1, 8000)),
-                "size_mm": st.tuples(numbers(1e-3, 1e5), numbers(1e-3, 1e5)),
+                "size_mm": st.tuples(numbers(8, 1e5), numbers(8, 1e5)),
                 "subpixels": subpixels,
             }
         ),
