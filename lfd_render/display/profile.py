@@ -17,6 +17,8 @@ from pydantic import Field, ValidationError, model_validator
 
 from lfd_render.data import data_folder
 from lfd_render.display.files import replacing
+from lfd_render.display.forms import form_data, is_form
+from lfd_render.display.global3d import ini_data, is_ini
 from lfd_render.display.looking_glass import is_visual_json, profile_data
 from lfd_render.display.migration import to_present
 from lfd_render.display.model import (
@@ -85,7 +87,7 @@ class DisplayProfile(ProfileFields):
 
     @staticmethod
     def load(name_or_path: str | Path) -> DisplayProfile:
-        """Profile of a shipped name, a profile file or a Looking Glass `visual.json`.
+        """Profile of a shipped name, a profile file, or a file that `display convert` writes.
 
         Raises ProfileError, one line naming file, field, value and remedy.
         """
@@ -94,13 +96,20 @@ class DisplayProfile(ProfileFields):
 
     @staticmethod
     def from_json(text: str, source: str = "profile") -> DisplayProfile:
-        """Profile of a JSON text; `source` names it in errors (ProfileError)."""
+        """Profile of a profile file's text, or another system's; `source` names it in errors.
+
+        Raises ProfileError.
+        """
+        if is_ini(text):
+            text = json.dumps(ini_data(text, source))
         try:
             data = json.loads(text)
         except (ValueError, RecursionError) as cause:
             raise ProfileError(f"{source}: is not valid JSON: {cause}; correct the file") from cause
         if is_visual_json(data):
             text = json.dumps(profile_data(text, source))
+        elif is_form(data):
+            text = json.dumps(form_data(text, source))
         elif isinstance(data, dict) and data.get("schema", SCHEMA) != SCHEMA:
             text = json.dumps(to_present(data, source))
         try:

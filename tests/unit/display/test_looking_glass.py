@@ -94,7 +94,7 @@ def test_cells_are_read_as_they_stand(key: str) -> None:
         ({"slope": {"value": 0}}, "slope is 0; it should be the cotangent"),
         ({"screenW": {"value": 1536.5}}, "screenW is 1536.5; it should be a whole number"),
         ({"flipImageY": {"value": 1}}, "flipImageY is 1; it should be 0"),
-        ({"invView": {"value": 0}}, "invView is 0; it should be 1"),
+        ({"invView": {"value": 2}}, "invView is 2; it should be 0 or 1"),
         ({"viewCone": {"value": 200}}, "viewing.cone_deg is 200"),
         ({"CellPatternMode": {"value": 7}}, "CellPatternMode is 7; it should be from 0 to 4"),
         ({"subpixelCells": [{"ROffsetX": 0.1}]}, "subpixelCells.0.ROffsetY is missing"),

@@ -1,0 +1,90 @@
+"""Many random profiles: saved, converted there and back, and spoilt."""
+
+import json
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from wild_profiles import mutated, profile_data
+
+from lfd_render.display import DisplayProfile
+from lfd_render.display.convert import WRITERS, convert, differences, views_apart
+from lfd_render.errors import ProfileError
+
+FULL, REDUCED = 100_000, 2000
+
+# Fields that a format has no room for, whatever they are; and where it has none of the picture's.
+LOST = {
+    "profile": (),
+    "looking-glass": (
+        "name", "serial", "date", "response", "correction", "provenance", "uncertainty",
+        "panel.size_mm", "panel.subpixels", "panel.mount", "lens.index", "lens.gap_mm",
+        "lens.center", "viewing.views", "viewing.distance_mm", "viewing.spacing",
+    ),
+    "van-berkel": (),
+    "physical": (),
+    "leia": (),
+}  # fmt: skip
+
+
+@pytest.mark.shows("random profiles come back equal from a file")
+def test_saved_profiles_come_back_equal(scaled: Callable[[int, int], int]) -> None:
+    rng = np.random.default_rng(11)
+    for _ in range(scaled(FULL, REDUCED)):
+        text = json.dumps(profile_data(rng))
+        profile = DisplayProfile.from_json(text)
+        again = DisplayProfile.from_json(profile.to_json())
+        assert again == profile
+        assert again.hash == profile.hash
+        assert not list(differences(profile, again))
+
+
+@pytest.mark.shows("random profiles come back equal from other formats where these hold them")
+def test_conversions_there_and_back(scaled: Callable[[int, int], int]) -> None:
+    rng = np.random.default_rng(12)
+    formats = [name for name in LOST if name != "profile"]
+    done = dict.fromkeys(formats, 0)
+    for n in range(scaled(FULL, REDUCED)):
+        name = formats[n % len(formats)]
+        data = profile_data(rng)
+        if name == "physical":
+            data["lens"].setdefault("gap_mm", 1.5)
+        profile = DisplayProfile.from_json(json.dumps(data))
+        try:
+            conversion = convert(profile, name)
+        except ProfileError as error:
+            assert any(part in str(error) for part in ("lens.drift is 0", "panel.subpixels"))
+            continue
+        done[name] += 1
+        for lost in conversion.lost:
+            assert lost.field.startswith(LOST[name]), (name, lost)
+        if not conversion.lost:
+            assert conversion.read_back == profile
+        # Once lost nothing more is: what the format holds it holds to the bit.
+        again = convert(conversion.read_back, name)
+        assert again.read_back == conversion.read_back
+        assert again.text == conversion.text
+        plain = profile.correction is None
+        # Centres of a thousand lenses have 2⁻⁴³ of a lens to themselves.
+        if n % 10 == 0 and plain:
+            apart = views_apart(profile, conversion.read_back)
+            assert apart is not None
+            assert apart / profile.views < 1e-9 or "panel.size_mm" in str(conversion.lost)
+    assert min(done.values()) > 0.3 * sum(done.values()) / len(done)
+
+
+@pytest.mark.shows("spoilt profiles are refused by the name of the field")
+def test_spoilt_profiles_name_the_field(scaled: Callable[[int, int], int]) -> None:
+    rng = np.random.default_rng(13)
+    for _ in range(scaled(FULL, REDUCED)):
+        data, field = mutated(rng, profile_data(rng))
+        with pytest.raises(ProfileError) as error:
+            DisplayProfile.from_json(json.dumps(data), source="p.json")
+        assert field in str(error.value), (field, str(error.value))
+        assert str(error.value).startswith("p.json: ")
+        assert "\n" not in str(error.value)
+        assert len(str(error.value)) < 400
+
+
+def test_every_format_is_tried() -> None:
+    assert {*LOST, "3d-global"} == set(WRITERS)
