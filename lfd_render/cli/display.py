@@ -8,9 +8,16 @@ from __future__ import annotations
 import typer
 
 from lfd_render.cli.console import PROGRAM
+from lfd_render.cli.display_maps import diff, view_map
+from lfd_render.cli.display_profiles import convert, list_displays, show, validate
 from lfd_render.errors import UsageError
 
 display = typer.Typer(name="display", help="Profiles of displays: show, check, convert, measure.")
+
+display.command("list")(list_displays)
+for command in (show, validate, convert, diff):
+    display.command()(command)
+display.command("map")(view_map)
 
 
 @display.callback(invoke_without_command=True)

@@ -205,7 +205,12 @@ SceneArgument = Annotated[
 ]
 DisplayOption = Annotated[
     str,
-    typer.Option("--display", "-d", metavar="NAME|FILE", help="Display profile."),
+    typer.Option(
+        "--display",
+        "-d",
+        metavar="NAME|FILE|auto",
+        help="Display profile; auto: of the drive that is mounted.",
+    ),
 ]
 ViewsOption = Annotated[
     str | None,

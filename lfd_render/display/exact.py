@@ -68,7 +68,8 @@ def json_text(value: Any) -> str:
 
 def _json(value: Any) -> str:
     if isinstance(value, Decimal):
-        plain = value.normalize()
+        with exactly():
+            plain = value.normalize()
         return f"{plain:f}" if -8 < plain.adjusted() < 20 else f"{plain:e}"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{json.dumps(k)}: {_json(v)}" for k, v in value.items()) + "}"

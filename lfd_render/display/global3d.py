@@ -4,8 +4,8 @@
 
 x and y are whole numbers from the left and the top, c the stripe. Views are counted from the right,
 as van Berkel's are: the formula is his with X = n, tan α = −dir·num/(3·den) and k_off = offset − ½.
-Phases on a view's boundary, which every den-th row has, belong to the view that the floor gives; half
-a step, 1/(2·den) of a subpixel, keeps the profile's phases off them.
+Phases on a view's boundary, which every den-th row has, belong to the view that the floor gives;
+half a step, 1/(2·den) of a subpixel, keeps the profile's phases off them.
 
 The vendor's file says nothing of the panel, so a section [panel] of ours goes with it.
 """

@@ -32,11 +32,13 @@ from lfd_render.display.model import (
     Spacing,
     resolve_lens,
 )
+from lfd_render.display.mounted import the_mounted_calibration
 from lfd_render.display.phase import PhaseTables, phase_tables
 from lfd_render.display.rig import Rig
 from lfd_render.display.strict import one_line, read_json_text
 from lfd_render.errors import ProfileError, UsageError
 
+AUTO = "auto"  # stands for the display whose drive is mounted
 LEAST_PIXEL_MM = 0.001  # of microdisplays they are four times as wide
 
 
@@ -87,7 +89,8 @@ class DisplayProfile(ProfileFields):
 
     @staticmethod
     def load(name_or_path: str | Path) -> DisplayProfile:
-        """Profile of a shipped name, a profile file, or a file that `display convert` writes.
+        """Profile of a shipped name, a profile file, a file that `display convert` writes, or
+        "auto", the one display whose calibration drive is mounted.
 
         Raises ProfileError, one line naming file, field, value and remedy.
         """
@@ -299,6 +302,8 @@ def shipped_profiles() -> tuple[str, ...]:
 def _find(name_or_path: str | Path) -> Path:
     """File of a shipped name or of a path; a text without separator or suffix is a name."""
     text, path = str(name_or_path), Path(name_or_path)
+    if text == AUTO:
+        return the_mounted_calibration()
     if text in shipped_profiles():
         return data_folder("display_profiles") / f"{text}.json"
     if isinstance(name_or_path, Path) or path.suffix or path.name != text or path.is_file():

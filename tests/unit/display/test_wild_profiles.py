@@ -5,11 +5,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from wild_profiles import mutated, profile_data
 
 from lfd_render.display import DisplayProfile
 from lfd_render.display.convert import WRITERS, convert, differences, views_apart
+from lfd_render.display.model import Stripes
 from lfd_render.errors import ProfileError
+
+from .wild_profiles import mutated, profile_data
 
 FULL, REDUCED = 100_000, 2000
 
@@ -25,6 +27,18 @@ LOST = {
     "physical": (),
     "leia": (),
 }  # fmt: skip
+
+
+def refusal(profile: DisplayProfile, name: str) -> str | None:
+    """Why a format has no file of a profile."""
+    subpixels = profile.panel.subpixels
+    if name == "looking-glass" and profile.drift == 0:
+        return "lens.drift is 0"
+    if name in ("van-berkel", "leia") and (
+        not isinstance(subpixels, Stripes) or subpixels.axis == "up"
+    ):
+        return "panel.subpixels"
+    return None
 
 
 @pytest.mark.shows("random profiles come back equal from a file")
@@ -50,11 +64,11 @@ def test_conversions_there_and_back(scaled: Callable[[int, int], int]) -> None:
         if name == "physical":
             data["lens"].setdefault("gap_mm", 1.5)
         profile = DisplayProfile.from_json(json.dumps(data))
-        try:
-            conversion = convert(profile, name)
-        except ProfileError as error:
-            assert any(part in str(error) for part in ("lens.drift is 0", "panel.subpixels"))
+        if reason := refusal(profile, name):
+            with pytest.raises(ProfileError, match=reason):
+                convert(profile, name)
             continue
+        conversion = convert(profile, name)
         done[name] += 1
         for lost in conversion.lost:
             assert lost.field.startswith(LOST[name]), (name, lost)
