@@ -1,7 +1,7 @@
 """A display's layout as a picture: which view each subpixel of a patch shows, and where eyes stand.
 
-Left: a patch at the panel's middle. Each subpixel is a box in its view's colour with the view's number,
-framed in its own colour; lens edges are lines. Right: panel, eyes and cone from above.
+Left: a patch at the panel's middle. Each subpixel is a box in its view's colour with the view's
+number, on a bar in its own colour; lens edges are lines. Right: panel, eyes and cone from above.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from lfd_render.display import DisplayProfile
 from lfd_render.display.model import Cells
 
 PATCH_PX = (14, 9)
-_PIXEL, _MARGIN, _HEAD, _RIG = 72, 24, 64, 560
+_PIXEL, _MARGIN, _HEAD, _RIG = 72, 24, 64, 420
 _INK, _PAPER, _FAINT = (24, 24, 24), (250, 250, 250), (150, 150, 150)
 
 
@@ -65,7 +65,8 @@ def _draw_patch(
         end = left + box[2] * _PIXEL - 1, top + box[3] * _PIXEL - 1
         number = int(view[row, column, channel])
         colour = _colour(number / count)
-        draw.rectangle((left, top, *end), fill=colour, outline=_CHANNELS[channel])
+        draw.rectangle((left, top, *end), fill=colour, outline=_PAPER)
+        draw.rectangle((left + 2, end[1] - 6, end[0] - 2, end[1] - 2), fill=_CHANNELS[channel])
         middle = (left + end[0]) / 2, (top + end[1]) / 2
         draw.text(middle, str(number), fill=_INK, anchor="mm", font_size=11)
     _draw_lens_edges(draw, profile, (first_x, first_y), size)
@@ -99,12 +100,16 @@ def _draw_lens_edges(
     first: tuple[int, int],
     size: tuple[int, int],
 ) -> None:
-    """Lines where φ is whole, as the formula has it for the stripe at the origin."""
+    """Lines where φ is whole. The formula puts the origin stripe at the pixel's middle; it is
+    drawn where it stands."""
     width, height = profile.resolution_px
+    subpixels = profile.panel.subpixels
+    origin = 0 if isinstance(subpixels, Cells) else "rgb".index(subpixels.origin[0])
+    right, up = (0.0, 0.0) if isinstance(subpixels, Cells) else _offset(profile, 0, origin)
 
     def x_at(lens: int, y_px: float) -> float:
-        v = (height - y_px) / height
-        return ((lens + profile.center) / profile.lens_count - v * profile.drift) * width
+        v = (height - y_px - up) / height
+        return ((lens + profile.center) / profile.lens_count - v * profile.drift) * width + right
 
     ends = (first[1], first[1] + size[1])
     lenses = [
