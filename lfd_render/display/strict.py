@@ -28,10 +28,11 @@ def read_json_text(path: Path, error: type[LfdError]) -> str:
         # Asking first keeps pipes, which may never be written, from being opened.
         if path.exists() and not path.is_file() and not path.is_dir():
             raise error(f"{path}: is not a regular file; give the path of a JSON file")
-        if path.is_file() and path.stat().st_size > MAX_JSON_BYTES:
+        size = path.stat().st_size if path.is_file() else 0
+        if size > MAX_JSON_BYTES:
             raise error(
-                f"{path}: is {path.stat().st_size} bytes; that is larger than {MAX_JSON_BYTES} bytes, "
-                "the limit for a JSON file"
+                f"{path}: is {size} bytes, larger than {MAX_JSON_BYTES} bytes, the limit for a "
+                "JSON file"
             )
         with path.open("rb") as file:
             data = file.read(MAX_JSON_BYTES + 1)

@@ -261,7 +261,7 @@ def test_too_few_cells_are_named() -> None:
         (b"[" * 100_000, "is not valid JSON"),
         (b"[1, 2]", "the top level is"),
         (b"7" * 5000, "is not valid JSON"),
-        (b" " * (MAX_JSON_BYTES + 1), "is 4194305 bytes; that is larger than 4194304 bytes"),
+        (b" " * (MAX_JSON_BYTES + 1), "is 4194305 bytes, larger than 4194304 bytes"),
     ],
 )
 def test_bad_files_are_named(tmp_path: Path, content: bytes, message: str) -> None:

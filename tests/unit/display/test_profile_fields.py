@@ -254,7 +254,7 @@ def test_a_file_of_4_gb_is_refused_unread(tmp_path: Path) -> None:
     path = tmp_path / "large.json"
     with path.open("wb") as file:
         file.truncate(4 << 30)
-    with pytest.raises(ProfileError, match=r"large.json: is 4294967296 bytes; .* 4194304"):
+    with pytest.raises(ProfileError, match=r"large.json: is 4294967296 bytes, larger than"):
         DisplayProfile.load(path)
 
 
