@@ -127,8 +127,8 @@ def _number(numbers: object, field: str, source: str) -> Decimal:
     if isinstance(value, bool) or not isinstance(value, Decimal | int | float):
         raise ProfileError(f"{where} is {value!r:.60}; it should be a number")
     number = Decimal(value)
-    if not number.is_finite() or abs(number) > 10**9:
-        raise ProfileError(f"{where} is {value}; it should be a finite number up to 1e9")
+    if not number.is_finite() or abs(number) > 10**12:
+        raise ProfileError(f"{where} is {value}; it should be a finite number up to 1e12")
     if field in _LIMITS:
         low, high, what = _LIMITS[field]
         if not low < number < high:
@@ -137,9 +137,9 @@ def _number(numbers: object, field: str, source: str) -> Decimal:
 
 
 _LIMITS: dict[str, tuple[Decimal | int, Decimal | int, str]] = {
-    "subpixels_per_lens": (0, 10**9, "above 0"),
-    "pitch_mm": (0, 10**5, "above 0, in millimetres"),
-    "gap_mm": (0, 10**5, "above 0, in millimetres"),
+    "subpixels_per_lens": (0, 10**12, "above 0"),
+    "pitch_mm": (0, 10**6, "above 0, in millimetres"),
+    "gap_mm": (0, 10**6, "above 0, in millimetres"),
     "index": (Decimal("0.999"), 4, "from 1 to 4"),
     "tilt_deg": (-_QUARTER_TURN_DEG, _QUARTER_TURN_DEG, "between -90 and 90"),
 }

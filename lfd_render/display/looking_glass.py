@@ -35,7 +35,7 @@ def _unwrap(value: Any) -> Any:
 
 
 Number = Annotated[float, BeforeValidator(_unwrap)]
-Positive = Annotated[float, Field(gt=0, le=1e6), BeforeValidator(_unwrap)]
+Positive = Annotated[float, Field(gt=0, le=1e12), BeforeValidator(_unwrap)]
 
 
 class _Cell(StrictModel, extra="ignore"):
