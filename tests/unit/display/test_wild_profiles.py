@@ -1,6 +1,7 @@
 """Many random profiles: saved, converted there and back, and spoilt."""
 
 import json
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -98,6 +99,46 @@ def test_spoilt_profiles_name_the_field(scaled: Callable[[int, int], int]) -> No
         assert str(error.value).startswith("p.json: ")
         assert "\n" not in str(error.value)
         assert len(str(error.value)) < 400
+
+
+SPOILERS = (
+    "NaN",
+    "-1",
+    "1e999",
+    "null",
+    "{}",
+    "[]",
+    "0",
+    '"x"',
+    "true",
+    "",
+    "9" * 400,
+    "-0",
+    "1e-300",
+)
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_spoilt_texts_of_any_format_are_read_or_refused(
+    name: str, scaled: Callable[[int, int], int]
+) -> None:
+    """One number, text or bracket replaced: a profile or a ProfileError, and nothing else."""
+    rng = np.random.default_rng(14)
+    refused = 0
+    for _ in range(scaled(1000, 30)):
+        data = profile_data(rng)
+        data["lens"] |= {"gap_mm": 1.0, "drift": 0.1}
+        data["panel"]["subpixels"] = {"layout": "stripe"}
+        text = convert(DisplayProfile.from_json(json.dumps(data)), name).text
+        spots = list(re.finditer(r'-?\d+\.?\d*(e[+-]?\d+)?|"[^"]*"|[\[\]{},]', text))
+        for _ in range(8):
+            start, end = spots[int(rng.integers(len(spots)))].span()
+            spoilt = text[:start] + SPOILERS[int(rng.integers(len(SPOILERS)))] + text[end:]
+            try:
+                DisplayProfile.from_json(spoilt, "p")
+            except ProfileError:
+                refused += 1
+    assert refused > 4 * scaled(1000, 30) * 0.5
 
 
 def test_every_format_is_tried() -> None:
