@@ -43,7 +43,8 @@ placement = Placement(camera_for(scene, display).display_from_world(display.size
 def frame(winners, general, **sampling):
     buffers = SceneBuffers(device, scene)
     target = ViewTarget(device, rig, grid, buffers.batches)
-    technique = Lfdpr(device, buffers, target, winners=winners, general=general, sampling=Sampling(**sampling))
+    choice = Sampling(**sampling)
+    technique = Lfdpr(device, buffers, target, winners=winners, general=general, sampling=choice)
     clock = StageClock(device)
     technique.begin(placement, clock)
     technique.warm_up(clock)
