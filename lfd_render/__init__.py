@@ -7,6 +7,7 @@ from lfd_render.version import __version__
 
 if TYPE_CHECKING:
     from lfd_render.display import Camera, DisplayProfile
+    from lfd_render.errors import LfdError
     from lfd_render.panel.eia import Eia
     from lfd_render.panel.look import look
     from lfd_render.panel.quilt import Quilt
@@ -19,6 +20,7 @@ __all__ = [
     "DisplayProfile",
     "Eia",
     "Environment",
+    "LfdError",
     "Pose",
     "Quilt",
     "Renderer",
@@ -35,6 +37,7 @@ _HOMES = {
     "DisplayProfile": "lfd_render.display",
     "Eia": "lfd_render.panel.eia",
     "Environment": "lfd_render.scene",
+    "LfdError": "lfd_render.errors",
     "Pose": "lfd_render.scene",
     "Quilt": "lfd_render.panel.quilt",
     "Renderer": "lfd_render.renderer",

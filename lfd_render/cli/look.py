@@ -17,6 +17,7 @@ from lfd_render.cli.outputs import (
     check_folder_output,
     check_picture_output,
     filling,
+    remove_others,
     write_picture,
 )
 
@@ -106,7 +107,7 @@ def look(
             side_by_side(
                 [
                     look_from(
-                        panel.pixels, profile, at, views or panel.views, size,
+                        panel.pixels, profile, at, views or panel.eye_views, size,
                         sigma_views=crosstalk, optics=optics.value,
                     )
                     for at in place.eyes(eyes_apart if stereo else None)
@@ -120,6 +121,7 @@ def look(
             with filling(folder) as temporary:
                 for name, picture in zip(names, seen, strict=True):
                     write_png(temporary / name, picture)
+            remove_others(folder, [folder / name for name in names], "frame")
         else:
             strip = side_by_side(seen)
             write_picture(output, lambda file: write_png(file, strip))

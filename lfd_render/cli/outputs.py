@@ -13,7 +13,6 @@ from lfd_render.cli.console import warn, writing_stdout
 from lfd_render.errors import OutputError, UsageError
 
 STDOUT = "-"
-_VIEW_NAME = re.compile(r"view_\d{3,}\.png")
 
 
 def check_picture_output(
@@ -86,14 +85,19 @@ def filling(folder: Path) -> Iterator[Path]:
         raise
 
 
-def remove_others(folder: Path, written: Sequence[Path]) -> None:
-    """Remove views of an earlier run, which are not among those written, and say so."""
-    views = [file for file in folder.iterdir() if _VIEW_NAME.fullmatch(file.name)]
-    older = [file for file in views if file not in written]
+def remove_others(folder: Path, written: Sequence[Path], what: str = "view") -> None:
+    """Remove views, or other numbered pictures, of an earlier run, which are not among those
+    written, and say so; with views also what `unweave` wrote about its own."""
+    named = re.compile(rf"{what}_\d{{3,}}\.png")
+    older = [f for f in folder.iterdir() if named.fullmatch(f.name) and f not in written]
     for file in older:
         file.unlink(missing_ok=True)
     if older:
-        warn(f"{folder}: {len(older)} views of an earlier run, with more views, are removed")
+        warn(f"{folder}: {len(older)} {what}s of an earlier run, with more {what}s, are removed")
+    about = folder / "views.json"
+    if what == "view" and about not in written and about.exists():
+        about.unlink()
+        warn(f"{about}: tells of the views that were here before, and is removed")
 
 
 def _remove_empty(folder: Path) -> None:

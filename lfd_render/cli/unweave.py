@@ -129,7 +129,7 @@ def _write(folder: Path, unwoven: Unwoven, profile: DisplayProfile) -> list[Path
     with filling(folder) as temporary:
         write_views(temporary, unwoven, profile)
     files = [folder / view_name(index) for index in range(len(unwoven.views))]
-    remove_others(folder, files)
+    remove_others(folder, [*files, folder / "views.json"])
     return files
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lfd_render.cli import options
-from lfd_render.cli.console import Stopwatch, print_json, progress, say
+from lfd_render.cli.console import Stopwatch, print_json, progress, say, warn
 from lfd_render.cli.inputs import (
     display_warnings,
     load_display,
@@ -112,6 +112,10 @@ def views(
             seed=seed,
             **light,
         )
+        said = renderer.warnings
+    for warning in said:
+        if warning not in loaded.warnings:  # those were said when it was loaded
+            warn(f"{scene}: {warning}")
     with watch.span("encode"), progress("Writing"):
         text = {
             "lfd:profile": profile.name,
@@ -134,7 +138,7 @@ def views(
                 "view_size": [pictures.shape[2], pictures.shape[1]],
                 "seed": seed,
                 "camera": window.to_json_dict(),
-                "warnings": [*display_warnings(profile), *loaded.warnings],
+                "warnings": [*display_warnings(profile), *said],
                 "timings_ms": watch.finish(),
             }
         )

@@ -115,8 +115,8 @@ def view_errors(profile: DisplayProfile, other: DisplayProfile, views: int) -> V
         {name: at(*end) for name, end in zip(CORNERS, ends, strict=True)},
         at(width // 2, height // 2),
         (
-            other_sign * other.lens_count - sign * profile.lens_count,
-            other_sign * other.lens_count * other.drift - sign * profile.lens_count * profile.drift,
+            sign * profile.lens_count - other_sign * other.lens_count,
+            sign * profile.lens_count * profile.drift - other_sign * other.lens_count * other.drift,
         ),
     )
 

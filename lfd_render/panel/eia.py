@@ -84,6 +84,12 @@ class EiaFile:
         return int(text) if re.fullmatch(r"[1-9]\d{0,3}", text) else None
 
     @property
+    def eye_views(self) -> int | None:
+        """Number of views that the rows of an eye's picture go by, where the file says it."""
+        text = self.metadata.get("lfd:eye-views", "")
+        return int(text) if re.fullmatch(r"[1-9]\d{0,3}", text) else self.views
+
+    @property
     def lens_rows(self) -> int | None:
         """Rows of the views woven in, where the file says that these follow the lenses."""
         size = re.fullmatch(r"\d{1,6}x([1-9]\d{0,5})", self.metadata.get("lfd:view-size", ""))

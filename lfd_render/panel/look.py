@@ -248,8 +248,8 @@ def _blurred(
             phase = tables.column[x, channel] + tables.row[y] + tables.cell[kind, channel]
             if tables.correction is not None:
                 phase += tables.correction_at(x, y)
-            sigmas = (phase - wanted) / spread
-            weight = np.where(inside & (np.abs(sigmas) <= CUT_SIGMAS), np.exp(-0.5 * sigmas**2), 0)
+            sigmas = np.minimum(np.abs(phase - wanted) / spread, 2.0 * CUT_SIGMAS)
+            weight = np.where(inside & (sigmas <= CUT_SIGMAS), np.exp(-0.5 * sigmas**2), 0)
             total += weight * light[y, x]
             weights += weight
     found = total / np.maximum(weights, 1e-30)

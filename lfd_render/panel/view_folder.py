@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -100,6 +101,12 @@ def _manifest(path: Path) -> dict[str, Any]:
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
         raise PictureError(f"{path}: schema is not {SCHEMA}; give a folder that 'unweave' wrote")
     for name, kinds in _FIELDS.items():
-        if not isinstance(data.get(name), kinds):
+        value = data.get(name)
+        number = isinstance(value, int | float) and 0 <= value < math.inf
+        if (
+            not isinstance(value, kinds)
+            or isinstance(value, bool)
+            or not (number or kinds == (str,))
+        ):
             raise PictureError(f"{path}: {name} is {data.get(name)!r}; unweave again")
     return data

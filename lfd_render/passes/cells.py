@@ -62,6 +62,16 @@ def strip_rows(scene: SceneBuffers, target: ViewTarget) -> int:
     return iterations_left(target.grid.columns * column_loops(scene, tested=tested) + 2)
 
 
+def strips(band: Band, points: CellCloud, rows: int) -> list[dict[str, int]]:
+    """Uniforms of the dispatches that splat a band: one, or, where a point is taller than a strip
+    of so many rows, one for each strip of the band, since points may stand anywhere."""
+    step, end = (band.rows if points.strips == 1 else rows), band.first + band.rows
+    return [
+        {"first_row": first, "end_row": min(first + step, end)}
+        for first in range(band.first, end, step)
+    ]
+
+
 class CellSource(ABC):
     """What both sources of cells share: the list, and learning how long it must be."""
 

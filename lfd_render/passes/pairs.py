@@ -9,7 +9,7 @@ from lfd_render.gpu.layout import dtype, lod_constants
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
-from lfd_render.passes.cells import CellCloud
+from lfd_render.passes.cells import CellCloud, strip_rows, strips
 from lfd_render.passes.items import GROUPS_ACROSS
 from lfd_render.passes.sample import PointCloud
 from lfd_render.passes.sampling import Points, Sampling
@@ -37,6 +37,7 @@ class CountPairs:
     ) -> None:
         self._scene = scene
         self._lanes = view_lanes(target.rig.views)
+        self._strip_rows = strip_rows(scene, target)
         self._projection = projection_buffers(device, target) if general else {}
         constants = {
             "VIEW_LANES": self._lanes,
@@ -73,13 +74,14 @@ class CountPairs:
         }
         if isinstance(points, CellCloud):
             count = int(points.work.read(dtype("CellWork"))["points"][0])
-            uniforms = {"first_row": band.first, "end_row": band.first + band.rows}
+            runs = strips(band, points, self._strip_rows)
         else:
             count = int(points.work.read(dtype("Work"))["items"][window])
-            uniforms = {"window": window}
-        kernel.set(buffers, uniforms, self._scene.samplers())
+            runs = [{"window": window}]
         lines = -(-count // GROUPS_ACROSS)
-        kernel.run((min(count, GROUPS_ACROSS), lines, -(-band.target.rig.views // self._lanes)))
+        for uniforms in runs:
+            kernel.set(buffers, uniforms, self._scene.samplers())
+            kernel.run((min(count, GROUPS_ACROSS), lines, -(-band.target.rig.views // self._lanes)))
         words = self._pairs.read(np.uint32).astype(object)
         return words[0] + (words[1] << 32), words[2] + (words[3] << 32)
 

@@ -6,7 +6,7 @@ from lfd_render.gpu.device import Device
 from lfd_render.gpu.layout import lod_constants
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
-from lfd_render.passes.cells import CellCloud, strip_rows
+from lfd_render.passes.cells import CellCloud, strip_rows, strips
 from lfd_render.passes.items import GROUPS_ACROSS
 from lfd_render.passes.sampling import Sampling
 from lfd_render.passes.splat import view_lanes
@@ -74,10 +74,7 @@ class SplatCells:
             "Eyes": band.target.eyes,
             "RowOffsets": band.target.row_offsets,
         }
-        # Points may stand anywhere, so strips tile the band wherever one is taller than a strip.
-        rows = band.rows if points.strips == 1 else self._strip_rows
-        for first in range(band.first, band.first + band.rows, rows):
-            strip = {"first_row": first, "end_row": first + rows}
+        for strip in strips(band, points, self._strip_rows):
             kernel.set(buffers, strip, self._scene.samplers())
             kernel.run_indirect(points.work)
 

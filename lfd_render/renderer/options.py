@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -30,6 +30,7 @@ PRESETS = ("default", "paper", "gold")
 PROJECTIONS = ("shear", "general")
 ENVIRONMENTS = ("studio", "none")
 MOST_VIEWS = 1024
+MOST_SEED = 2**32 - 1
 MOST_SUPERSAMPLES = 16  # each way
 MOST_RADIANCE = 65504.0  # what half floats hold
 
@@ -86,6 +87,7 @@ class RenderOptions:
 
     def __post_init__(self) -> None:
         """Check ranges; raises UsageError."""
+        self._check_types()
         for name, choice, choices in (
             ("technique", self.technique, TECHNIQUES),
             ("preset", self.preset, PRESETS),
@@ -137,6 +139,28 @@ class RenderOptions:
                 f"environment intensity: {self.environment_intensity} is out of range; "
                 f"use a number from 0 to {MOST_RADIANCE:g}"
             )
+
+    def _check_types(self) -> None:
+        """Raise UsageError for what is of another kind than the fields' own."""
+        wanted = {
+            "exposure": (_is_number, "a number"),
+            "environment_turn_rad": (_is_number, "a number"),
+            "environment_intensity": (_is_number, "a number"),
+            "seed": (_is_seed, f"0 to {MOST_SEED}"),
+            "repeat": (_is_whole, "a whole number"),
+            "background": (
+                lambda c: isinstance(c, tuple | list) and all(map(_is_number, c)),
+                "three numbers",
+            ),
+            "spacing": (lambda s: s in (None, *get_args(Spacing)), "lens, angle, tangent or None"),
+            "texture_limit": (_is_flag, "True, False or None"),
+            "stochastic_culling": (_is_flag, "True, False or None"),
+            "effort": (_is_flag, "True or False"),
+        }
+        for name, (fits, remedy) in wanted.items():
+            value = getattr(self, name)
+            if not fits(value):
+                raise UsageError(f"{name.replace('_', ' ')}: {value!r}; use {remedy}")
 
     @property
     def lod_rule(self) -> str:
@@ -243,6 +267,26 @@ class RenderOptions:
                 f"splat '{self.splat}': technique '{self.technique}' does not splat; "
                 "use it with lfdpr"
             )
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
+
+
+def _is_whole(value: object) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def _is_seed(value: object) -> bool:
+    return (
+        isinstance(value, int | np.integer)
+        and not isinstance(value, bool)
+        and 0 <= int(value) <= MOST_SEED
+    )
+
+
+def _is_flag(value: object) -> bool:
+    return value is None or isinstance(value, bool | np.bool_)
 
 
 def _whole(value: object, most: int) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from lfd_render.display import DisplayProfile, Reconstruction, Rig, ViewGrid
+from lfd_render.errors import UsageError
 from lfd_render.renderer.options import MOST_VIEWS, RenderOptions
 
 # With so many eyes a view, each subpixel's own angle is within 1/16 of a view interval of an eye's.
@@ -68,7 +69,12 @@ def plan_panel(display: DisplayProfile, choice: RenderOptions) -> ViewPlan:
 def plan_views(
     display: DisplayProfile, choice: RenderOptions, rig: Rig | None, size: tuple[int, int]
 ) -> ViewPlan:
-    """What single upright views of a size take; rig: other eyes than the display's."""
+    """What single upright views of a size take; rig: other eyes than the display's.
+
+    Raises UsageError for what makes a panel image of views.
+    """
+    if choice.preset == "gold":
+        raise UsageError("preset 'gold': is for panel images; use it with render")
     fineness, eyes = choice.supersample
     grid = ViewGrid.upright(display, *size)
     if rig is None:

@@ -209,6 +209,11 @@ class Renderer:
         with self._call():
             return self._views(scene, display, camera, plan, choice, pose=pose)
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is to be said of the scene rendered last, and of what the device could not hold."""
+        return tuple(self._buffers.warnings) if self._buffers else ()
+
     def _views(
         self,
         scene: Scene,
@@ -262,6 +267,8 @@ class Renderer:
         """
         if not isinstance(display, DisplayProfile):
             raise UsageError(f"display: {display!r}; give a DisplayProfile, as its load(…) makes")
+        if not isinstance(views, np.ndarray | Quilt | Unwoven):
+            raise UsageError(f"views: {type(views).__name__}; give a Quilt, Unwoven or an array")
         if isinstance(views, Unwoven):
             grid = views.grid
         pictures = views if isinstance(views, np.ndarray) else views.views

@@ -161,9 +161,10 @@ class Stage:
         self._device.check()
         metadata = eia_metadata(
             self.display,
-            # As many as `look` takes rows for: where views are more than rows allow, the display's.
-            plan.views if plan.rows_follow_views else self.display.views,
+            plan.views,
             grid,
+            # What an eye's rows go by: where views are more than rows allow, the display's.
+            eye_views=plan.views if plan.rows_follow_views else self.display.views,
             technique=choice.technique,
             preset=choice.preset,
             lod=choice.lod_rule,

@@ -15,7 +15,7 @@ class Effort:
     """What a frame took. pairs_tried: pixels that points tried in the views that their triangles
     face, at least one for each point and view (for each row of points and view, where rows are
     what is splatted); pairs_kept: those inside their triangle and opaque; visible_pixels: of all
-    views, blended ones counted apart."""
+    views, those that show something."""
 
     points: int = 0
     pairs_tried: int = 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
@@ -164,20 +165,23 @@ class Lfdpr:
                     pairs = counter(batch, points, band, window)
                     tried, kept = tried + pairs[0], kept + pairs[1]
             self._views.clear()
+            shown = np.zeros(0, bool)
             for blended in (False, True):
                 layer = [p for p in self._batches() if (p[0].alpha_mode == "blend") == blended]
                 self._views.clear_words()
                 self._find_winners(layer, band)
-                visible += self._visible_pixels(band)
+                found = self._shown(band)
+                shown = shown | found if shown.size else found
+            visible += int(np.count_nonzero(shown))
         counter.release()
         return Effort(self.count_points(), tried, kept, visible)
 
-    def _visible_pixels(self, band: Band) -> int:
-        """Pixels that the layer splatted last shows."""
+    def _shown(self, band: Band) -> NDArray[np.bool_]:
+        """Which pixels the layer splatted last shows."""
         pixels = band.rows * self.target.rig.views * self.target.grid.columns
         words = self._views.words.read(np.uint32, self._views.word_stride * pixels)
         ids = words[:: self._views.word_stride]
-        return int(np.count_nonzero(ids != CONSTANTS["NO_TRIANGLE"]))
+        return np.asarray(ids != CONSTANTS["NO_TRIANGLE"])
 
     def _batches(self) -> list[tuple[Batch, Points]]:
         return list(zip(self._scene.batches, self._points, strict=True))

@@ -27,7 +27,7 @@ void splat_cell(Cell point, int view, float eye) {
     Plane plane = triangle_plane(a, b, c);
     Aligned t = align(a, b, c, plane);
     Box box = cell_box(t, lattice_steps_mm[point.triangle], uvec2(point.cell & 0xFFFFu, point.cell >> 16), eye);
-    ivec2 rows = clamp(rows_of_box(box), first_row, end_row);
+    ivec2 boxed_rows = rows_of_box(box), rows = clamp(boxed_rows, first_row, end_row);
     int boxed = 0;
     for (int row = rows.x; row < rows.y; row++) {
         PointRow points = point_row(point.triangle, row);
@@ -40,5 +40,5 @@ void splat_cell(Cell point, int view, float eye) {
         splat_interval(points, seen, view, eye);
     }
     if (faces(draws[corners.w].facing, eye_side(plane, eye * frame.column_mm)))
-        tried(uint(first_row == frame.band_first ? max(boxed, 1) : boxed));
+        tried(uint(boxed_rows.x >= first_row && boxed_rows.x < end_row ? max(boxed, 1) : boxed));
 }

@@ -70,6 +70,7 @@ class FakeRenderer:
 
     error: BaseException | None = None
     device: str = ""
+    warnings: tuple[str, ...] = ("something odd",)
     calls: list[dict[str, Any]] = field(default_factory=list)
 
     def __call__(self, device: str) -> "FakeRenderer":

@@ -35,6 +35,32 @@ def test_views_are_numbered_from_the_left(
     assert texts[0]["lfd:profile"] == "small"
 
 
+def test_views_end_what_was_told_of_others(
+    command: Command, scene: Path, display: Path, tmp_path: Path
+) -> None:
+    """Upright views must not be taken for the lens-aligned ones that a folder held before."""
+    folder = tmp_path / "views"
+    folder.mkdir()
+    (folder / "views.json").write_text("{}")
+    (folder / f"view_{VIEWS:03d}.png").touch()
+    (folder / "mine.txt").touch()
+    result = command("views", scene, "-o", folder, "-d", display, "--json")
+    assert {path.name for path in folder.iterdir() if path.suffix != ".png"} == {"mine.txt"}
+    assert "views.json: tells of the views that were here before" in result.stderr
+    assert "1 views of an earlier run" in result.stderr
+    assert "something odd" in result.json["warnings"]  # of the device, beside the scene's own
+
+
+def test_sweeps_remove_frames_of_longer_ones(
+    command: Command, eia: Path, display: Path, tmp_path: Path
+) -> None:
+    arguments = ("look", eia, "-d", display, "-o", tmp_path / "sweep", "--sweep")
+    assert command(*arguments, "-10:10:4").code == 0
+    result = command(*arguments, "-5:5:2")
+    assert len(list((tmp_path / "sweep").iterdir())) == 2
+    assert "2 frames of an earlier run" in result.stderr
+
+
 def test_a_failure_leaves_no_folder(
     command: Command, renderer: FakeRenderer, scene: Path, display: Path, tmp_path: Path
 ) -> None:

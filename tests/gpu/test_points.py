@@ -6,7 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from lfd_render.display import DisplayProfile
 from lfd_render.gpu.device import Device
+from lfd_render.passes import owned
 from lfd_render.passes.pairs import CountPairs
 from lfd_render.passes.sampling import Sampling
 from lfd_render.reference import Pixels, Visibility, points
@@ -15,9 +17,18 @@ from lfd_render.reference.owners import cell_owner, row_owner
 from lfd_render.reference.pipeline import shade_over
 from lfd_render.reference.raster import covers, faces, meet, rays
 from lfd_render.reference.shade import Shading, points_at
+from lfd_render.renderer import Renderer
 from lfd_render.scene import Instance, Material, Scene, TextureSlot
 
-from .helpers import Passes, examples, mesh_of, passes, scene_of
+from .helpers import (
+    PAPER,
+    Passes,
+    examples,
+    mesh_of,
+    millimetre_camera,
+    passes,
+    scene_of,
+)
 from .test_shade import FULL_TOLERANCE, HALF_STEP, noise, views
 
 pytestmark = pytest.mark.needs("gl")
@@ -161,6 +172,40 @@ def test_the_papers_boxes_try_more_than_they_keep(device: Device) -> None:
         assert tried > kept > 0
     assert by_name["cells"][2] > by_name["rows"][2]  # boxes of neighbours overlap
     assert by_name["general"][2] > by_name["rows"][2]  # and so do those of rows by matrices
+
+
+def test_tall_points_are_counted_whole(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Strip by strip, as they are splatted: a software device would cut longer loops off."""
+    rig, grid = views(48, 36, 2)
+    scene, sampling = coarse_scene(np.random.default_rng(6)), Sampling(lattice="paper")
+    found = []
+    for iterations in (65535, 3 * grid.columns):
+        monkeypatch.setattr(owned, "MOST_ITERATIONS", iterations)
+        with passes(device, scene, rig, grid, sampling=sampling, winners="two-pass") as opened:
+            strips = max(cloud.strips for _, cloud in opened.batches)
+            found.append((strips > 1, count_pairs(device, opened, sampling)))
+    assert found == [(False, found[0][1]), (True, found[0][1])]
+
+
+def test_pixels_of_two_layers_count_once(device: Device) -> None:
+    """A pane over a wall: as many pixels as the wall has."""
+    square = np.array([[-60.0, -60, 0], [60, -60, 0], [60, 60, 0], [-60, 60, 0]])
+    corners = square[[[0, 1, 2], [0, 2, 3]]]
+    glass = Material("glass", (1, 1, 1, 0.5), alpha_mode="blend")
+    wall = mesh_of(corners - (0.0, 0.0, 5.0))
+    display = DisplayProfile.load(PAPER)
+    seen = []
+    with Renderer(device) as renderer:
+        for scene in (
+            scene_of(wall),
+            scene_of(wall, mesh_of(0.9 * corners, 1), materials=(Material("plain"), glass)),
+        ):
+            report = renderer.render(
+                scene, display, millimetre_camera(display.size_mm), 3, view_size=(48, 36),
+                effort=True,
+            ).report  # fmt: skip
+            seen.append(report["visible_pixels"])
+    assert seen[0] == seen[1] > 100
 
 
 def test_counts_run_over_32_bits(device: Device) -> None:

@@ -143,9 +143,15 @@ def test_bands_and_paths_change_nothing(
     assert whole.linear is not None
     # `look` takes the rows of a display's views where there are more views than that.
     more = kind in ("continuous", "gold")
-    assert whole.metadata["lfd:views"] == str(small.views if more else options["views"])
+    assert whole.metadata["lfd:views"] == str(plan.views)
+    assert whole.metadata["lfd:eye-views"] == str(small.views if more else options["views"])
     plain = renderer.render(scene, small, views=6)
     assert np.abs(whole.pixels.astype(int) - plain.pixels).mean() > 1
+
+
+def test_gold_is_for_panel_images(renderer: Renderer, scene: Scene, small: DisplayProfile) -> None:
+    with pytest.raises(UsageError, match="preset 'gold': is for panel images"):
+        renderer.views(scene, small, preset="gold")
 
 
 def test_continuous_views_are_each_subpixel_s_own(

@@ -53,3 +53,21 @@ def test_what_is_not_chosen_follows_from_what_is(
 def test_what_cannot_be_says_so(options: dict[str, object], message: str) -> None:
     with pytest.raises(UsageError, match=message.replace("?", r"\?")):
         RenderOptions(**options)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"exposure": "1EV"}, "exposure: '1EV'; use a number"),
+        ({"seed": -1}, "seed: -1; use 0 to 4294967295"),
+        ({"seed": 2**40}, "seed: 1099511627776; use 0"),
+        ({"repeat": 1.5}, "repeat: 1.5; use a whole number"),
+        ({"background": "red"}, "background: 'red'; use three numbers"),
+        ({"spacing": "even"}, "spacing: 'even'; use lens, angle"),
+        ({"texture_limit": "no"}, "texture limit: 'no'; use True"),
+        ({"environment_turn_rad": None}, "environment turn rad: None; use a number"),
+    ],
+)
+def test_what_is_of_the_wrong_kind_says_so(options: dict[str, object], message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        RenderOptions(**options)

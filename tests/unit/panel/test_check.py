@@ -46,7 +46,7 @@ def test_it_is_the_error_of_the_view_maps() -> None:
 def test_a_wrong_lens_count_shows_as_fringes() -> None:
     errors = view_errors(PORTRAIT, with_lens(lens_count=PORTRAIT.lens_count - 0.25), VIEWS)
     across, up = errors.fringes
-    assert (across, up) == pytest.approx((-0.25, 0.25 * -PORTRAIT.drift))
+    assert (across, up) == pytest.approx((0.25, 0.25 * PORTRAIT.drift))
     # Left edge to right edge a quarter of the cone, less the half pixels at both ends.
     step = errors.corners["bottom_right"] - errors.corners["bottom_left"]
     assert step == pytest.approx(0.25 * VIEWS * 1535 / 1536, abs=1e-6)
