@@ -1,0 +1,6 @@
+"""Calibration of an unknown panel from photographs of test patterns."""
+
+from lfd_render.display.calibration.corners import Corners, find_corners, given_corners
+from lfd_render.display.calibration.fit import Fit, PhotoSet, fit
+
+__all__ = ["Corners", "Fit", "PhotoSet", "find_corners", "fit", "given_corners"]
