@@ -23,7 +23,6 @@ from PIL import Image
 
 Float64 = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
-SHAPE = 3
 
 
 @dataclass(frozen=True)
@@ -205,9 +204,7 @@ def blurred(light: Float64, sigma_px: float) -> Float64:
     for axis in (0, 1):
         padded = np.pad(light, [(reach, reach) if a == axis else (0, 0) for a in range(3)])
         size = light.shape[axis]
-        parts = (
-            k * np.take(padded, range(i, i + size), axis=axis) for i, k in enumerate(kernel)
-        )
+        parts = (k * np.take(padded, range(i, i + size), axis=axis) for i, k in enumerate(kernel))
         light = sum(parts, np.zeros(1))
     return light
 
@@ -215,7 +212,8 @@ def blurred(light: Float64, sigma_px: float) -> Float64:
 def wall(size_px: tuple[int, int], rng: np.random.Generator) -> Pixels:
     """A photograph of a blank wall in uneven light."""
     width, height = size_px
-    shade = 0.5 + 0.1 * np.linspace(-1, 1, width)[None, :] + 0.05 * np.linspace(-1, 1, height)[:, None]
+    across, down = np.linspace(-1, 1, width)[None, :], np.linspace(-1, 1, height)[:, None]
+    shade = 0.5 + 0.1 * across + 0.05 * down
     codes = shade[..., None] + rng.normal(0, 0.0316, (height, width, 3))
     return np.rint(255 * np.clip(codes, 0, 1)).astype(np.uint8)
 

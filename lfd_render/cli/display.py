@@ -8,14 +8,17 @@ from __future__ import annotations
 import typer
 
 from lfd_render.cli.console import PROGRAM
+from lfd_render.cli.display_calibrate import calibrate
+from lfd_render.cli.display_fit import fit
 from lfd_render.cli.display_maps import diff, view_map
+from lfd_render.cli.display_pattern import pattern
 from lfd_render.cli.display_profiles import convert, list_displays, show, validate
 from lfd_render.errors import UsageError
 
 display = typer.Typer(name="display", help="Profiles of displays: show, check, convert, measure.")
 
 display.command("list")(list_displays)
-for command in (show, validate, convert, diff):
+for command in (show, validate, convert, diff, pattern, fit, calibrate):
     display.command()(command)
 display.command("map")(view_map)
 

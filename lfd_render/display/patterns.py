@@ -1,4 +1,4 @@
-"""Test patterns: pictures of a panel, uint8 [y, x, 3], exact under the profile that they are made of.
+"""Test patterns: pictures of a panel, uint8 [y, x, 3], exact under the profile they are made for.
 
 A grating lights the subpixels of one view; an eye in that view's place sees it everywhere if the
 profile is right, and fringes that follow the difference of the lattices if it is not. The patterns
@@ -125,6 +125,11 @@ def view_grating(
     return np.where(lit, np.uint8(255), np.uint8(0))
 
 
+def ruler_width(profile: DisplayProfile) -> int:
+    """Views to light for a person: enough to see, few enough to judge."""
+    return max(1, profile.views // 6)
+
+
 def view_numbers(profile: DisplayProfile) -> Pixels:
     """Each view shows its own number, as many times as fit; leading zeros included."""
     width, height = profile.resolution_px
@@ -158,9 +163,9 @@ def pitch_ruler(profile: DisplayProfile, step_lenses: float = 0.25) -> Pixels:
     picture = blank(profile, 0)
     for band, count in enumerate(counts):
         drift = profile.drift * profile.lens_count / count
-        picture[edges[band] : edges[band + 1]] = view_grating(_turned(profile, count, drift))[
-            edges[band] : edges[band + 1]
-        ]
+        rows = slice(edges[band], edges[band + 1])
+        turned = _turned(profile, count, drift)
+        picture[rows] = view_grating(turned, None, ruler_width(profile))[rows]
     labels = [f"{count:.2f}" for count in counts]
     places = [(0, int(edges[b])) for b in range(RULER_BANDS)]
     return _labelled(picture, labels, places, min(height // (2 * RULER_BANDS), width // 24))
@@ -171,7 +176,7 @@ def tilt_ruler(profile: DisplayProfile, step_deg: float = 0.05) -> Pixels:
 
     The column lit alike from top to bottom has the right tilt. All agree at the middle row.
     """
-    width, height = profile.resolution_px
+    width = profile.resolution_px[0]
     tilt_deg = np.degrees(profile.tilt_rad)
     tilts = [tilt_deg + step_deg * (band - RULER_BANDS // 2) for band in range(RULER_BANDS)]
     edges = np.linspace(0, width, RULER_BANDS + 1).astype(int)
@@ -181,14 +186,15 @@ def tilt_ruler(profile: DisplayProfile, step_deg: float = 0.05) -> Pixels:
         drift = aspect * float(np.tan(np.radians(tilt)))
         columns = slice(edges[band], edges[band + 1])
         turned = _turned(profile, profile.lens_count, drift)
-        picture[:, columns] = view_grating(turned)[:, columns]
+        picture[:, columns] = view_grating(turned, None, ruler_width(profile))[:, columns]
     labels = [f"{tilt:.2f}" for tilt in tilts]
     places = [(int(edges[b]), 0) for b in range(RULER_BANDS)]
     return _labelled(picture, labels, places, max(8, width // (4 * RULER_BANDS)))
 
 
 def crosstalk_bars(profile: DisplayProfile) -> Pixels:
-    """Bars of 1, 2, 3, 4, 6, 8, 12 and 16 views about the middle, lit to the left, dark to the right.
+    """Bars of 1, 2, 3, 4, 6, 8, 12 and 16 views about the middle, lit on the left half, dark on
+    the right.
 
     The eye in the middle sees full light to the left, and black to the right, from that width on
     which the lenses' crosstalk does not reach beyond.
@@ -238,7 +244,8 @@ def _turned(profile: DisplayProfile, lens_count: float, drift: float) -> Display
 def _codes(light: NDArray[np.float64]) -> Pixels:
     """sRGB codes of light (IEC 61966-2-1)."""
     encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    return np.rint(255 * encoded).astype(np.uint8)
+    codes: Pixels = np.rint(255 * encoded).astype(np.uint8)
+    return codes
 
 
 def _blocks(profile: DisplayProfile) -> Iterator[slice]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import ExifTags, Image, PngImagePlugin, UnidentifiedImageError
+from PIL import ExifTags, Image, ImageOps, PngImagePlugin, UnidentifiedImageError
 
 from lfd_render.display.files import replacing
 from lfd_render.errors import PictureError, UsageError
@@ -43,6 +43,19 @@ def read_picture(path: str | Path) -> Pixels:
     PictureError for a file that is missing, damaged, of another kind or above 67 megapixels.
     """
     return read_picture_file(path).pixels
+
+
+def read_photograph(path: str | Path) -> Pixels:
+    """Pixels of a camera's picture, uint8 [y, x, 3], upright as its orientation tag says.
+
+    Raises PictureError as `read_picture` does.
+    """
+    with _opened(Path(path)) as image:
+        if image.mode not in _EIGHT_BIT_MODES:
+            raise PictureError(
+                f"{path}: has pixels of mode {image.mode}; convert it to 8 bits a channel"
+            )
+        return np.array(ImageOps.exif_transpose(image).convert("RGB"))
 
 
 def read_png_text(path: str | Path) -> dict[str, str]:

@@ -68,8 +68,8 @@ def fit_beat(u: Float64, v: Float64, swing: Complex, grid: tuple[int, int]) -> B
     plane[:2] = a, b
     turn = swing * np.exp(-2j * np.pi * (a * across + b * up))
     plane[2:] = np.angle(turn.sum(axis=1)) / (2 * np.pi)
-    robust = weight
-    residual = np.zeros(swing.shape)
+    robust: Float64 = weight
+    residual: Float64 = np.zeros(swing.shape)
     for _ in range(_ROUNDS):
         fitted = (flat @ plane).reshape(swing.shape)
         residual = np.angle(swing * np.exp(-2j * np.pi * fitted)) / (2 * np.pi)
@@ -79,7 +79,7 @@ def fit_beat(u: Float64, v: Float64, swing: Complex, grid: tuple[int, int]) -> B
         miss = residual * np.sqrt(weight) / (_TUKEY * spread)
         robust = weight * np.where(np.abs(miss) < 1, (1 - miss**2) ** 2, 0)
         change = _solve(flat, robust.ravel(), residual.ravel())
-        plane = plane + change
+        plane += change
         if np.abs(change).max() < 1e-9:
             break
     fitted = (flat @ plane).reshape(swing.shape)
@@ -90,11 +90,11 @@ def fit_beat(u: Float64, v: Float64, swing: Complex, grid: tuple[int, int]) -> B
     inverse = np.linalg.inv(normal)
     variance = float((robust * residual**2).sum() / max(np.count_nonzero(robust) - 2 - groups, 1))
     variance *= _together(residual, robust, grid, variance)
-    offset = plane[2:] - (plane[0] + plane[1]) / 2
+    middle: Float64 = plane[2:]
     return Beat(
         (float(plane[0]), float(plane[1])),
-        offset,
-        plane[2:],
+        middle - (plane[0] + plane[1]) / 2,
+        middle,
         np.where(weight > 0, residual, np.nan),
         inverse * variance,
         inverse @ (robust.ravel()[:, None] * flat).T,
@@ -120,22 +120,20 @@ def _strongest(
         size = np.maximum(np.abs(group), 1e-30)
         even = group / size * np.minimum(size, np.median(size))
         power += np.abs(np.fft.fft2(even.reshape(grid), s=shape)) ** 2
-    top = np.unravel_index(np.argmax(power), shape)
+    y, x = divmod(int(np.argmax(power)), shape[1])
+    peak = float(power[y, x])
     # Blocks lie at equal steps but for the pixels that they happen to hold.
     step_u = float(np.median(np.diff(u.reshape(grid), axis=1)))
     step_v = float(np.median(np.diff(v.reshape(grid), axis=0)))
-    a = float(np.fft.fftfreq(shape[1])[top[1]]) / step_u
-    b = float(np.fft.fftfreq(shape[0])[top[0]]) / step_v
-    peak = float(power[top])
-    rows_off = (np.arange(shape[0]) - top[0] + shape[0] // 2) % shape[0] - shape[0] // 2
-    columns_off = (np.arange(shape[1]) - top[1] + shape[1] // 2) % shape[1] - shape[1] // 2
+    a = float(np.fft.fftfreq(shape[1])[x]) / step_u
+    b = float(np.fft.fftfreq(shape[0])[y]) / step_v
+    rows_off = (np.arange(shape[0]) - y + shape[0] // 2) % shape[0] - shape[0] // 2
+    columns_off = (np.arange(shape[1]) - x + shape[1] // 2) % shape[1] - shape[1] // 2
     far = (np.abs(rows_off)[:, None] > 2 * _PADDING) | (np.abs(columns_off) > 2 * _PADDING)
-    return a, b, float(np.sqrt(np.where(far, power, 0).max() / max(peak, 1e-300)))
+    return a, b, float(np.sqrt(float(np.where(far, power, 0).max()) / max(peak, 1e-300)))
 
 
-def _together(
-    residual: Float64, weight: Float64, grid: tuple[int, int], variance: float
-) -> float:
+def _together(residual: Float64, weight: Float64, grid: tuple[int, int], variance: float) -> float:
     """By how much the means of neighbouring blocks scatter more than if each were by itself."""
     rows, columns = grid
     worst = 1.0

@@ -99,9 +99,7 @@ class Blocks:
         return mean
 
 
-def panel_from_photo(
-    photo_from_panel: Float64, x: Float64, y: Float64
-) -> tuple[Float64, Float64]:
+def panel_from_photo(photo_from_panel: Float64, x: Float64, y: Float64) -> tuple[Float64, Float64]:
     """(u, v from the top) of photograph points."""
     m = np.linalg.inv(photo_from_panel)
     w = m[2, 0] * x + m[2, 1] * y + m[2, 2]

@@ -143,7 +143,8 @@ def _rough_corners(light: Float64, name: str, remedy: str) -> Float64:
         raise PictureError(f"{name}: the bright panel reaches the photograph's edge; {remedy}")
     y, x = np.nonzero(area)
     ends = [np.argmin(x + y), np.argmax(x - y), np.argmax(x + y), np.argmin(x - y)]
-    return np.stack([x[ends] + 0.5, y[ends] + 0.5], axis=1) * cell
+    found: Float64 = np.stack([x[ends] + 0.5, y[ends] + 0.5], axis=1) * float(cell)
+    return found
 
 
 def _otsu(values: Float64) -> float:
@@ -220,10 +221,10 @@ def _line(place: Float64, edge: Float64) -> tuple[Float64, float]:
     design = np.stack([np.ones_like(place), place], axis=1)
     keep = np.ones(len(place), np.bool_)
     line = np.zeros(2)
-    residual = edge
+    residual: Float64 = edge
     for _ in range(4):
-        line = np.linalg.lstsq(design[keep], edge[keep], rcond=None)[0]
-        residual = edge - design @ line
+        line[:] = np.linalg.lstsq(design[keep], edge[keep], rcond=None)[0]
+        residual = np.asarray(edge - design @ line, np.float64)
         spread = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
         keep = np.abs(residual) <= 3 * max(spread, 0.05)
     return line, float(residual[keep].std()) * 2 / float(np.sqrt(keep.sum() / 4))

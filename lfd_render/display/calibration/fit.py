@@ -43,6 +43,7 @@ MOST_RESIDUAL = 0.12  # cycles; phases of noise alone have 0.29
 STRIPE_DOUBT_PX = 0.01  # subpixels this near to plain stripes are plain stripes
 _LONGER_SIDE = (12, 48)  # blocks
 _LENSES_A_BLOCK = 3
+_SIGMA_FLOOR = 0.005  # of σ: the camera's own blur dims finer fringes, too
 _SHARED_FLOOR = 1e-4  # cycles: codes of 8 bits and curves that are not quite sRGB
 
 
@@ -89,7 +90,7 @@ class _Measured:
     offset_mm: tuple[float, float]
 
     def middle(self, guess: DisplayProfile) -> Float64:
-        """d of each colour in the panel's middle, at pixel centres: a subpixel is seen beside it."""
+        """d of each colour in the panel's middle, at pixel centres; subpixels lie beside them."""
         places = np.array(_offsets(guess.panel.subpixels))
         aside = (places - places.mean())[list(self.colours)]
         found: Float64 = self.beat.middle + self.beat.slopes[0] * aside / guess.resolution_px[0]
@@ -146,7 +147,7 @@ def _measure(photos: PhotoSet, guess: DisplayProfile) -> _Measured:
     corners = corners.lit_by(guess.lens_count, guess.lens_count * guess.drift)
     grid = _grid(guess)
     blocks: Blocks | None = None
-    sums: dict[tuple[int, int], Float64] = {}
+    sums: dict[tuple[int, int], NDArray[np.complex128]] = {}
     levels: dict[tuple[int, int], Float64] = {}
     for key, shots in groups.items():
         lights = []
@@ -204,9 +205,7 @@ def _grid(guess: DisplayProfile) -> tuple[int, int]:
     return max(8, round(height * scale)), max(8, round(width * scale))
 
 
-def _demodulated(
-    steps: list[Step], lights: Float64
-) -> tuple[NDArray[np.complex128], Float64]:
+def _demodulated(steps: list[Step], lights: Float64) -> tuple[NDArray[np.complex128], Float64]:
     """A·exp(2πi·k·δ) and B of each block from its light in each step, [step, block]."""
     turn = 2 * np.pi * np.array([step.shift for step in steps])
     design = np.stack([np.ones_like(turn), np.cos(turn), np.sin(turn)], axis=1)
@@ -264,7 +263,7 @@ def _corner_covariance(beat: Beat, blocks: Blocks, corners: Corners, groups: int
 
 
 def _crosstalk(
-    sums: dict[tuple[int, int], Float64],
+    sums: dict[tuple[int, int], NDArray[np.complex128]],
     swing: NDArray[np.complex128],
     colours: tuple[int, ...],
     beat: Beat,
@@ -292,7 +291,8 @@ def _crosstalk(
         spread = doubt / max(whole, 1e-6) / (2 * np.pi**2 * (harmonic**2 - 1))
         sigma = math.sqrt(max(squared, 0.0))
         # σ² is what is measured; near 0 its root is less certain than it is large.
-        found[colour] = sigma, math.sqrt(max(squared, 0.0) + spread) - sigma
+        doubt = math.sqrt(max(squared, 0.0) + spread) - sigma
+        found[colour] = sigma, math.hypot(doubt, _SIGMA_FLOOR * sigma)
     return found
 
 
@@ -365,16 +365,19 @@ def _assemble(
     center = final * (1 + drift) / 2 - phase
     center += round(guess.center - center)
 
-    share = np.array(weights) / sum(weights) if isinstance(subpixels, Stripes) else np.eye(
-        1, len(weights)
-    )[0]
+    share = (
+        np.array(weights) / sum(weights)
+        if isinstance(subpixels, Stripes)
+        else np.eye(1, len(weights))[0]
+    )
     doubts = _doubts(here, count, drift, share, stretched)
     if gap_doubt is not None and gap is not None:
         doubts["gap_mm"] = gap_doubt
     sigma_views = list(guess.response.sigma_views)
+    in_views = guess.views * count / guess.lens_count  # patterns have the guess's lenses
     for colour, (sigma, doubt) in here.sigma.items():
-        sigma_views[colour] = sigma * guess.views
-        doubts[f"sigma_views.{COLOURS[colour]}"] = doubt * guess.views
+        sigma_views[colour] = sigma * in_views
+        doubts[f"sigma_views.{COLOURS[colour]}"] = doubt * in_views
     doubts |= {f"offset_px.{COLOURS[c]}": value for c, value in doubts_px.items()}
 
     assumed = _still_assumed(guess, gap_doubt is not None)
@@ -496,7 +499,7 @@ def _cells(found: list[float]) -> Cells:
 
 
 def _still_assumed(guess: DisplayProfile, with_gap: bool) -> tuple[str, ...]:
-    measured = ("lens.lens_count", "lens.drift", "lens.tilt", "lens.center")
+    measured: tuple[str, ...] = ("lens.lens_count", "lens.drift", "lens.tilt", "lens.center")
     measured += ("lens.gap_mm",) if with_gap else ()
     return tuple(a for a in guess.provenance.assumed if not a.startswith(measured))
 
