@@ -13,6 +13,7 @@ least squares on what remains of the phases, robustly.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +70,7 @@ def fit_beat(u: Float64, v: Float64, swing: Complex, grid: tuple[int, int]) -> B
     turn = swing * np.exp(-2j * np.pi * (a * across + b * up))
     plane[2:] = np.angle(turn.sum(axis=1)) / (2 * np.pi)
     robust: Float64 = weight
-    residual: Float64 = np.zeros(swing.shape)
+    residual: NDArray[Any] = np.zeros(swing.shape)
     for _ in range(_ROUNDS):
         fitted = (flat @ plane).reshape(swing.shape)
         residual = np.angle(swing * np.exp(-2j * np.pi * fitted)) / (2 * np.pi)
@@ -87,13 +88,13 @@ def fit_beat(u: Float64, v: Float64, swing: Complex, grid: tuple[int, int]) -> B
     coherent = np.abs((swing * np.exp(-2j * np.pi * fitted)).sum(axis=1)).sum()
 
     normal = flat.T @ (robust.ravel()[:, None] * flat)
-    inverse = np.linalg.inv(normal)
+    inverse = np.asarray(np.linalg.inv(normal), np.float64)
     variance = float((robust * residual**2).sum() / max(np.count_nonzero(robust) - 2 - groups, 1))
     variance *= _together(residual, robust, grid, variance)
-    middle: Float64 = plane[2:]
+    middle = np.array(plane[2:], np.float64)
     return Beat(
         (float(plane[0]), float(plane[1])),
-        middle - (plane[0] + plane[1]) / 2,
+        np.asarray(middle - (plane[0] + plane[1]) / 2, np.float64),
         middle,
         np.where(weight > 0, residual, np.nan),
         inverse * variance,
@@ -105,8 +106,8 @@ def fit_beat(u: Float64, v: Float64, swing: Complex, grid: tuple[int, int]) -> B
 
 def _solve(design: Float64, weight: Float64, value: Float64) -> Float64:
     normal = design.T @ (weight[:, None] * design)
-    found: Float64 = np.linalg.lstsq(normal, design.T @ (weight * value), rcond=None)[0]
-    return found
+    found = np.linalg.lstsq(normal, design.T @ (weight * value), rcond=None)[0]
+    return np.asarray(found, np.float64)
 
 
 def _strongest(
@@ -115,7 +116,7 @@ def _strongest(
     """Slopes (a, b) of the strongest frequency of all groups, and its strongest rival."""
     rows, columns = grid
     shape = (_PADDING * rows, _PADDING * columns)
-    power = np.zeros(shape)
+    power: NDArray[Any] = np.zeros(shape)
     for group in swing:
         size = np.maximum(np.abs(group), 1e-30)
         even = group / size * np.minimum(size, np.median(size))
@@ -136,7 +137,7 @@ def _strongest(
 def _together(residual: Float64, weight: Float64, grid: tuple[int, int], variance: float) -> float:
     """By how much the means of neighbouring blocks scatter more than if each were by itself."""
     rows, columns = grid
-    worst = 1.0
+    worst: float = 1.0
     for side in (2, 4, 8):
         if min(rows, columns) < 2 * side:
             break
@@ -151,5 +152,6 @@ def _together(residual: Float64, weight: Float64, grid: tuple[int, int], varianc
         some = weights > 0
         degrees = max(np.count_nonzero(some) - 3, 1)
         scatter = float((total[some] ** 2 / weights[some]).sum()) / degrees
-        worst = max(worst, scatter / max(variance, 1e-300))
+        ratio = scatter / max(variance, 1e-300)
+        worst = max(worst, ratio)
     return worst
