@@ -77,12 +77,13 @@ class Photographer:
     panel: Panel
     camera: Camera
     _index: NDArray[np.int64] = field(init=False)
-    _weight: Float64 = field(init=False)  # [ray, place, channel]
+    _weight: NDArray[np.float32] = field(init=False)  # [ray, place, channel]
     _inside: NDArray[np.bool_] = field(init=False)
 
     def __post_init__(self) -> None:
         x, y, self._inside = self._rays()
-        self._index, self._weight = self._through_lenses(x, y)
+        self._index, weight = self._through_lenses(x[self._inside], y[self._inside])
+        self._weight = weight.astype(np.float32)
 
     def _rays(self) -> tuple[Float64, Float64, NDArray[np.bool_]]:
         """Places on the panel in mm from its middle, y up, and whether they are on it."""
@@ -112,7 +113,7 @@ class Photographer:
         u, v = q[0] / q[2], q[1] / q[2]
         inside = (u > 0) & (u < 1) & (v > 0) & (v < 1)
         mm = self.panel.size_mm
-        return (u - 0.5) * mm[0], (0.5 - v) * mm[1], inside.reshape(px.shape)
+        return (u - 0.5) * mm[0], (0.5 - v) * mm[1], inside
 
     def _through_lenses(self, x: Float64, y: Float64) -> tuple[NDArray[np.int64], Float64]:
         """Subpixels that each ray sees, as pixel indices [ray, place], and their weights."""
@@ -151,13 +152,13 @@ class Photographer:
     def light(self, pattern: Pixels) -> Float64:
         """Light at the sensor, [y, x, 3], a white panel 1."""
         assert pattern.shape[1::-1] == self.panel.resolution_px, pattern.shape
-        linear = decoded(pattern / 255).reshape(-1, 3)
+        linear = decoded(np.arange(256) / 255).astype(np.float32)[pattern].reshape(-1, 3)
         light = np.zeros((self._inside.size, 3))
         for channel in range(3):
             if linear[:, channel].any():
-                seen = linear[self._index, channel] * self._weight[..., channel]
-                light[:, channel] = seen.sum(axis=1)
-        light[~self._inside.ravel()] = 0
+                seen = np.ascontiguousarray(linear[:, channel])[self._index]
+                weight = self._weight[..., channel]
+                light[self._inside, channel] = np.einsum("rp,rp->r", seen, weight)
         rays, (width, height) = self.camera.rays, self.camera.size_px
         return light.reshape(height, rays, width, rays, 3).mean(axis=(1, 3))
 

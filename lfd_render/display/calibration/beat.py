@@ -131,7 +131,7 @@ def _strongest(
     rows_off = (np.arange(shape[0]) - y + shape[0] // 2) % shape[0] - shape[0] // 2
     columns_off = (np.arange(shape[1]) - x + shape[1] // 2) % shape[1] - shape[1] // 2
     far = (np.abs(rows_off)[:, None] > 2 * _PADDING) | (np.abs(columns_off) > 2 * _PADDING)
-    return a, b, float(np.sqrt(float(np.where(far, power, 0).max()) / max(peak, 1e-300)))
+    return a, b, float(np.sqrt(float(np.where(far, power, 0).max()) / (peak + 1e-300)))
 
 
 def _together(residual: Float64, weight: Float64, grid: tuple[int, int], variance: float) -> float:
@@ -150,8 +150,7 @@ def _together(residual: Float64, weight: Float64, grid: tuple[int, int], varianc
 
         total, weights = sums(residual * weight), sums(weight)
         some = weights > 0
-        degrees = max(np.count_nonzero(some) - 3, 1)
+        degrees = max(int(np.count_nonzero(some)) - 3, 1)
         scatter = float((total[some] ** 2 / weights[some]).sum()) / degrees
-        ratio = scatter / max(variance, 1e-300)
-        worst = max(worst, ratio)
+        worst = max(worst, scatter / max(variance, 1e-300))
     return worst

@@ -132,7 +132,8 @@ def _rough_corners(light: Float64, name: str, remedy: str) -> Float64:
     coarse = light[: rows * cell, : columns * cell].reshape(rows, cell, columns, cell).mean((1, 3))
     level = _otsu(coarse)
     bright, dark = coarse > level, coarse <= level
-    contrast = coarse[bright].mean() / max(coarse[dark].mean(), 1e-9) if bright.any() else 0.0
+    parted = bright.any() and dark.any()
+    contrast = coarse[bright].mean() / max(coarse[dark].mean(), 1e-9) if parted else 1.0
     area = _largest(bright)
     if contrast < LEAST_CONTRAST or area.mean() < LEAST_AREA:
         raise PictureError(
