@@ -177,9 +177,9 @@ def test_a_wrong_guess_converges(lenses: float, tilt_deg: float) -> None:
 
 
 def test_colours_and_crosstalk_are_measured() -> None:
-    panel = replace(TRUTH, sigma_lenses=0.05)
+    panel = replace(Panel(), sigma_lenses=0.05)
     guess = guess_for(panel, lenses=0.4, tilt_deg=0.03, order="bgr")
-    found = fit([photo_set(panel, CAMERA, guess, 3, (0, 1, 2))], guess)
+    found = fit([photo_set(panel, Camera(), guess, 3, (0, 1, 2))], guess)
     assert isinstance(found.profile.panel.subpixels, Stripes)
     assert found.profile.panel.subpixels.order == "rgb"  # the guess had it the other way
     for sigma in found.profile.response.sigma_views:
@@ -187,7 +187,7 @@ def test_colours_and_crosstalk_are_measured() -> None:
     assert abs(misses(found, panel).views) < 0.05
     odd = replace(panel, offsets_px=(-0.3, 0.02, 0.25))
     guess = guess_for(odd, lenses=0.2)
-    found = fit([photo_set(odd, CAMERA, guess, 4, (0, 1, 2), (1,))], guess)
+    found = fit([photo_set(odd, Camera(), guess, 4, (0, 1, 2), (1,))], guess)
     subpixels = found.profile.panel.subpixels
     assert isinstance(subpixels, Cells)
     across = np.array(subpixels.offsets_px)[0, :, 0]
