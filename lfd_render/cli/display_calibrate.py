@@ -110,12 +110,13 @@ def calibrate(
 
 
 def _show(profile: DisplayProfile, stage: Stage, path: str, ruler: bool) -> None:
+    from lfd_render.display.mount import stored  # noqa: PLC0415 (keeps --help quick)
     from lfd_render.display.patterns import PATTERNS, ruler_width, view_grating  # noqa: PLC0415
     from lfd_render.panel.picture import write_png  # noqa: PLC0415
 
     wide = ruler_width(profile)
     picture = PATTERNS[stage.ruler](profile) if ruler else view_grating(profile, None, wide)
-    write_png(path, picture)
+    write_png(path, stored(picture, profile.panel.mount))
 
 
 def _answer(prompt: str) -> str:

@@ -75,6 +75,7 @@ def pattern(
         check_picture_output(output, json)
 
     from lfd_render.display import DisplayProfile  # noqa: PLC0415 (keeps --help quick)
+    from lfd_render.display.mount import stored  # noqa: PLC0415
     from lfd_render.display.patterns import COLOURS, PATTERNS, view_grating  # noqa: PLC0415
     from lfd_render.panel.picture import write_png  # noqa: PLC0415
 
@@ -89,7 +90,8 @@ def pattern(
             picture = view_grating(profile, view, 1 if width is None else width, chosen)
         else:
             picture = PATTERNS[kind](profile)
-        write_picture(output, lambda file: write_png(file, picture))
+        taken = stored(picture, profile.panel.mount)
+        write_picture(output, lambda file: write_png(file, taken))
         files = [output]
         size = " × ".join(map(str, profile.resolution_px))
         say(f"{output}: {kind} for '{profile.name}', {size}")
@@ -110,6 +112,7 @@ def _write_phases(
     folder: Path, profile: DisplayProfile, steps: int | None, colours: tuple[int, ...]
 ) -> list[str]:
     """The white pattern and all steps; all files appear or none."""
+    from lfd_render.display.mount import stored  # noqa: PLC0415 (keeps --help quick)
     from lfd_render.display.patterns import (  # noqa: PLC0415 (keeps --help quick)
         STEPS,
         blank,
@@ -119,9 +122,10 @@ def _write_phases(
     from lfd_render.panel.picture import write_png  # noqa: PLC0415
 
     wanted = phase_steps(profile, STEPS if steps is None else steps, colours)
+    mount = profile.panel.mount
     names = ["white.png"] + [f"{step.name}.png" for step in wanted]
     with filling(folder) as temporary:
-        write_png(temporary / names[0], blank(profile, 255))
+        write_png(temporary / names[0], stored(blank(profile, 255), mount))
         for name, step in zip(names[1:], wanted, strict=True):
-            write_png(temporary / name, phase_pattern(profile, step))
+            write_png(temporary / name, stored(phase_pattern(profile, step), mount))
     return [str(folder / name) for name in names]

@@ -116,10 +116,11 @@ def _assemble(
     guess_middle = guess.lens_count * (1 + guess.drift) / 2 - guess.center
     aside = (here.offset_mm[0] + here.offset_mm[1] * lean) * guess.distance_mm / here.distance_mm
     slot = float(slot_from_eye(np.array(aside), guess))
+    slot = -slot if guess.viewing.inverted else slot
     subpixels, offset_px, doubts_px = _subpixels(here, guess, count)
     weights, values, measured = [], [], here.middle(guess)
     for group, colour in enumerate(here.colours):
-        moved = (offsets_px(guess.panel.subpixels)[colour] * guess.lens_count
+        moved = (offsets_px(guess.panel.subpixels, guess)[colour] * guess.lens_count
                  - offset_px[colour] * count) / guess.resolution_px[0]  # fmt: skip
         weights.append(1 / here.covariance[2 + group, 2 + group])
         values.append(float(measured[group]) - moved)
@@ -146,10 +147,13 @@ def _assemble(
     for colour, (sigma, doubt) in here.sigma.items():
         sigma_views[colour] = sigma * in_views
         doubts[f"sigma_views.{COLOURS[colour]}"] = doubt * in_views
-    doubts |= {f"offset_px.{COLOURS[c]}": value for c, value in doubts_px.items()}
+    doubts |= {f"offsets_px.{COLOURS[c]}": value for c, value in doubts_px.items()}
 
     assumed = _still_assumed(guess, gap_doubt is not None)
     known = {key: value for key, value in doubts.items() if key in Uncertainty.model_fields}
+    for key in ("offsets_px", "sigma_views"):
+        each = [value for name, value in doubts.items() if name.startswith(f"{key}.")]
+        known |= {key: max(each)} if each else {}
     lens = guess.lens.model_copy(
         update={"lens_count": final, "drift": drift, "center": center, "gap_mm": gap}
     )
@@ -167,12 +171,7 @@ def _assemble(
         "uncertainty": Uncertainty(**known),
     }
     profile = DisplayProfile(**fields)
-    views = guess.views
-    with np.errstate(invalid="ignore"):
-        counted = np.isfinite(here.beat.residual)
-        total = np.where(counted, here.beat.residual, 0).sum(axis=0)
-        residual = -views * np.where(counted.any(axis=0), total / counted.sum(axis=0).clip(1),
-                                     np.nan).reshape(here.blocks.grid)  # fmt: skip
+    residual = _residual_views(here, guess.views)
     a, b = here.beat.slopes
     report = {
         "lens_count": final,
@@ -191,6 +190,14 @@ def _assemble(
         "photographs": shots,
     }
     return Fit(profile, residual, doubts, report)
+
+
+def _residual_views(here: Measured, views: int) -> Float64:
+    """What the plane leaves of each block, the mean of the colours, [row, column]."""
+    counted = np.isfinite(here.beat.residual)
+    total = np.where(counted, here.beat.residual, 0).sum(axis=0)
+    mean = np.where(counted.any(axis=0), total / counted.sum(axis=0).clip(1), np.nan)
+    return np.asarray(-views * mean.reshape(here.blocks.grid), np.float64)
 
 
 def _doubts(
@@ -219,7 +226,7 @@ def _subpixels(
 
     d_c = center − center_g + (off_g·P_g − off·P)/W for each colour c.
     """
-    known = list(offsets_px(guess.panel.subpixels))
+    known = list(offsets_px(guess.panel.subpixels, guess))
     if len(here.colours) < 2:
         return guess.panel.subpixels, known, {}
     width = guess.resolution_px[0]
@@ -238,7 +245,7 @@ def _subpixels(
         other: Any = "bgr" if guess.panel.subpixels.order == "rgb" else "rgb"
         layouts.append(guess.panel.subpixels.model_copy(update={"order": other}))
     for layout in layouts:
-        places = offsets_px(layout)
+        places = offsets_px(layout, guess)
         misses = [
             abs(_nearest(found[c] - found[first] - places[c] + places[first], width / count))
             <= max(STRIPE_DOUBT_PX, 3 * doubts[c])
@@ -246,16 +253,22 @@ def _subpixels(
         ]
         if all(misses):
             return layout, list(places), doubts
-    return _cells(found), found, doubts
+    return _cells(guess, [f - k for f, k in zip(found, known, strict=True)]), found, doubts
 
 
 def _nearest(offset: float, period: float) -> float:
     return offset - period * round(offset / period)
 
 
-def _cells(found: list[float]) -> Cells:
-    red, green, blue = ((offset, 0.0) for offset in found)
-    return Cells(layout="cells", pattern_mode=0, offsets_px=((red, green, blue),))
+def _cells(guess: DisplayProfile, moved: list[float]) -> Cells:
+    """The guess's subpixels, each colour moved to the right."""
+    subpixels = guess.panel.subpixels
+    mode, offsets = 0, np.array([[(o, 0.0) for o in offsets_px(subpixels, guess)]])
+    if isinstance(subpixels, Cells):
+        mode, offsets = subpixels.pattern_mode, np.array(subpixels.offsets_px)
+    offsets[..., 0] += moved
+    kinds = tuple(tuple((float(x), float(y)) for x, y in kind) for kind in offsets)
+    return Cells(layout="cells", pattern_mode=mode, offsets_px=kinds)  # type: ignore[arg-type] # three colours each
 
 
 def _still_assumed(guess: DisplayProfile, with_gap: bool) -> tuple[str, ...]:

@@ -69,7 +69,7 @@ class Measured:
 
     def middle(self, guess: DisplayProfile) -> Float64:
         """d of each colour in the panel's middle, at pixel centres; subpixels lie beside them."""
-        places = np.array(offsets_px(guess.panel.subpixels))
+        places = np.array(offsets_px(guess.panel.subpixels, guess))
         aside = (places - places.mean())[list(self.colours)]
         found: Float64 = self.beat.middle + self.beat.slopes[0] * aside / guess.resolution_px[0]
         return found
@@ -251,9 +251,16 @@ def _crosstalk(
     return found
 
 
-def offsets_px(subpixels: Stripes | Cells) -> tuple[float, float, float]:
-    """Offsets of the colours to the right, in pixels: the mean of all cells."""
+def offsets_px(subpixels: Stripes | Cells, profile: DisplayProfile) -> tuple[float, float, float]:
+    """Offsets of the colours in pixels to the right, the mean of all cells.
+
+    One upwards counts as that to the right which has the same phase: T·W/H of it.
+    """
     if isinstance(subpixels, Stripes):
-        return subpixels.offsets_px()
-    red, green, blue = np.array(subpixels.offsets_px)[..., 0].mean(axis=0)
-    return float(red), float(green), float(blue)
+        upright = subpixels.axis == "up"
+        offsets = [((0.0, o) if upright else (o, 0.0)) for o in subpixels.offsets_px()]
+    else:
+        offsets = list(np.array(subpixels.offsets_px).mean(axis=0))
+    width, height = profile.resolution_px
+    red, green, blue = (float(x + y * profile.drift * width / height) for x, y in offsets)
+    return red, green, blue
