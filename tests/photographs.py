@@ -37,6 +37,7 @@ class Panel:
     index: float = 1.49
     phase: float = 0.3  # lenses at the middle of the panel
     sigma_lenses: float = 0.03
+    bow: float = 0.0  # lenses by which the sheet is off its lattice at the left and right, smoothly
     offsets_px: tuple[float, float, float] = (-1 / 3, 0.0, 1 / 3)  # from the pixel's centre
 
     def seen(self, distance_mm: float) -> tuple[float, float, float]:
@@ -125,7 +126,7 @@ class Photographer:
         nearer = depth / (eye_z + depth)
         lens_x, lens_y = x + (eye_x - x) * nearer, y + (eye_y - y) * nearer
         across = (lens_x * math.cos(alpha) + lens_y * math.sin(alpha)) / panel.pitch_mm
-        place = across + panel.phase
+        place = across + panel.phase + panel.bow * ((2 * lens_x / panel.size_mm[0]) ** 2 - 1 / 3)
         to_axis = (np.floor(place) + 0.5 - place) * panel.pitch_mm
         axis_x = lens_x + to_axis * math.cos(alpha)
         axis_y = lens_y + to_axis * math.sin(alpha)

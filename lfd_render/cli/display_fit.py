@@ -63,6 +63,12 @@ def fit(
     residual: Annotated[
         str | None, typer.Option(metavar="FILE", help="PNG of what the fit leaves, in views.")
     ] = None,
+    correction: Annotated[
+        bool,
+        typer.Option(
+            "--correction", help="Make what the fit leaves, smoothed, the profile's correction."
+        ),
+    ] = False,
     name: Annotated[str | None, typer.Option(help="Name of the profile.")] = None,
     json: options.JsonOption = False,
 ) -> None:
@@ -90,7 +96,7 @@ def fit(
         for index, folder in enumerate(photos)
     ]
     with watch.span("fit"), progress("Fitting"):
-        found = fitted(sets, guess, name)
+        found = fitted(sets, guess, name, correction=correction)
     write_picture(output, found.profile.save)
     if residual is not None:
         _write_residual(residual, found)

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from lfd_render.display.calibration.corners import Float64
+from lfd_render.display.calibration.correction import correction_of
 from lfd_render.display.calibration.measure import Measured, PhotoSet, measure, offsets_px
 from lfd_render.display.model import Cells, Provenance, Response, Stripes, Uncertainty
 from lfd_render.display.patterns import COLOURS
@@ -46,11 +47,18 @@ class Fit:
     report: dict[str, Any] = field(default_factory=dict)
 
 
-def fit(sets: Sequence[PhotoSet], guess: DisplayProfile, name: str | None = None) -> Fit:
+def fit(
+    sets: Sequence[PhotoSet],
+    guess: DisplayProfile,
+    name: str | None = None,
+    *,
+    correction: bool = False,
+) -> Fit:
     """The profile that the photographs show, `guess` being that which the patterns were made for.
 
-    One set, or two from different distances. Raises PictureError where they do not determine the
-    lenses, UsageError where sets contradict each other.
+    One set, or two from different distances. `correction`: whether what the lattice leaves of the
+    phases, smoothed, becomes the profile's correction. Raises PictureError where the photographs do
+    not determine the lenses, UsageError where sets contradict each other.
     """
     if not 1 <= len(sets) <= 2:
         raise UsageError(f"fit: {len(sets)} sets of photographs; give one, or two from 2 distances")
@@ -60,7 +68,8 @@ def fit(sets: Sequence[PhotoSet], guess: DisplayProfile, name: str | None = None
     if len(measured) == 2:
         gap, gap_doubt = _gap(measured, guess, sets)
     shots = sum(len(one.shots) for one in sets)
-    return _assemble(here, guess, gap=gap, gap_doubt=gap_doubt, name=name, shots=shots)
+    found = _assemble(here, guess, gap=gap, gap_doubt=gap_doubt, name=name, shots=shots)
+    return _corrected(found, here, guess) if correction else found
 
 
 def _gap(
@@ -171,7 +180,7 @@ def _assemble(
         "uncertainty": Uncertainty(**known),
     }
     profile = DisplayProfile(**fields)
-    residual = _residual_views(here, guess.views)
+    residual = _residual_views(here, -guess.views if guess.viewing.inverted else guess.views)
     a, b = here.beat.slopes
     report = {
         "lens_count": final,
@@ -190,6 +199,25 @@ def _assemble(
         "photographs": shots,
     }
     return Fit(profile, residual, doubts, report)
+
+
+def _corrected(found: Fit, here: Measured, guess: DisplayProfile) -> Fit:
+    """The fit with a correction of its residuals."""
+    sign = -1 if guess.viewing.inverted else 1
+    lenses = sign * found.residual_views.ravel() / guess.views
+    stated, doubt = correction_of(lenses, here.blocks.u, here.blocks.v, guess)
+    known = found.profile.uncertainty
+    assert known is not None
+    update = {
+        "correction": stated,
+        "uncertainty": known.model_copy(update={"phase_lenses": doubt}),
+    }
+    report = found.report | {
+        "correction_max_views": guess.views * float(np.abs(stated.phase_lenses).max())
+    }
+    doubts = found.doubts | {"phase_lenses": doubt}
+    report["uncertainty"] = doubts
+    return Fit(found.profile.model_copy(update=update), found.residual_views, doubts, report)
 
 
 def _residual_views(here: Measured, views: int) -> Float64:

@@ -237,6 +237,23 @@ def test_a_cameras_distortion_and_curve_are_borne() -> None:
     assert abs(miss.views) < 0.05
 
 
+def test_a_bowed_sheet_is_corrected() -> None:
+    panel = replace(Panel(), bow=0.04)  # 1.9 of 48 views at the sides
+    guess = guess_for(panel, lenses=0.2)
+    found = fit([photo_set(panel, Camera(), guess, 10, harmonics=(1,))], guess, correction=True)
+    assert found.profile.correction is not None
+    nodes = np.array(found.profile.correction.phase_lenses)
+    bow = panel.bow * (np.linspace(-1, 1, nodes.shape[1]) ** 2 - 1 / 3)
+    # A tenth of a view; a correction of the wrong sign would be off by four.
+    assert np.abs(nodes - bow).max() * 48 < 0.2
+    assert abs(misses(found, panel).views) < 0.1
+    again = found.profile
+    second = fit([photo_set(panel, Camera(), again, 11, harmonics=(1,))], again, correction=True)
+    assert second.report["residual_rms_views"] < found.report["residual_rms_views"] / 10
+    assert second.profile.correction is not None
+    assert np.abs(np.array(second.profile.correction.phase_lenses) - bow).max() * 48 < 0.2
+
+
 def test_corners_are_found_and_given_alike() -> None:
     guess = guess_for(TRUTH, lenses=0.5)
     photos = photo_set(TRUTH, CAMERA, guess, 8, harmonics=(1,))
