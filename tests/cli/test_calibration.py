@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from lfd_render.display import DisplayProfile
+from lfd_render.display.patterns import view_grating
 from lfd_render.panel.picture import read_picture
 
 from ..photographs import Panel
@@ -88,6 +89,18 @@ def test_patterns_are_the_panels_pixels(command: Command, guess: Path, tmp_path:
     assert result.code == 0
     names = {path.name for path in folder.iterdir()}
     assert names == {"white.png"} | {f"green{h}_{s}of3.png" for h in ("", "_h3") for s in range(3)}
+
+
+def test_patterns_lie_as_the_panel_takes_them(
+    command: Command, guess: Path, tmp_path: Path
+) -> None:
+    data = json.loads(guess.read_text(encoding="utf-8"))
+    turned, file = tmp_path / "turned.json", tmp_path / "p.png"
+    data["panel"]["mount"] = {"rotation_deg": 90, "flip_x": True}
+    turned.write_text(json.dumps(data), encoding="utf-8")
+    lit = view_grating(DisplayProfile.load(guess))
+    assert command("display", "pattern", "grating", "--display", turned, "-o", file).code == 0
+    assert np.array_equal(read_picture(file), np.rot90(lit[:, ::-1]))
 
 
 @pytest.mark.parametrize(

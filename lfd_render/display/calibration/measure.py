@@ -27,6 +27,7 @@ LEAST_MODULATION = 0.03  # swing over mean light
 LEAST_COHERENCE = 0.6
 MOST_RIVAL = 0.7
 MOST_RESIDUAL = 0.12  # cycles; phases of noise alone have 0.29
+_ALIKE_FRINGES = 0.5
 _LONGER_SIDE = (12, 48)  # blocks
 _LENSES_A_BLOCK = 3
 _SIGMA_FLOOR = 0.005  # of σ: the camera's own blur dims finer fringes, too
@@ -102,6 +103,7 @@ def measure(photos: PhotoSet, guess: DisplayProfile) -> Measured:
     corners = corners.lit_by(guess.lens_count, guess.lens_count * guess.drift)
     grid = _grid(guess)
     blocks: Blocks | None = None
+    finer_lights: list[Float64] = []
     sums: dict[tuple[int, int], Complex] = {}
     levels: dict[tuple[int, int], Float64] = {}
     for key, shots in groups.items():
@@ -110,7 +112,10 @@ def measure(photos: PhotoSet, guess: DisplayProfile) -> Measured:
             pixels = read()
             if blocks is None:
                 blocks = Blocks.of(corners, pixels.shape[1::-1], grid)
+                finer = Blocks.of(corners, pixels.shape[1::-1], _finer(grid))
             lights.append(blocks.light(pixels, file))
+            if not sums:
+                finer_lights.append(finer.light(pixels, file))
         sums[key], levels[key] = _demodulated([s for s, _, _ in shots], np.array(lights))
     assert blocks is not None
     colours = tuple(colour for colour, harmonic in sums if harmonic == 1)
@@ -121,6 +126,10 @@ def measure(photos: PhotoSet, guess: DisplayProfile) -> Measured:
         raise _undetermined(photos.name, "the photographs of its steps do not differ")
     beat = fit_beat(blocks.u, blocks.v, swing, grid)
     _check(photos.name, beat, modulation)
+    first = [step for step, _, _ in next(iter(groups.values()))]
+    finer_swing = np.where(finer.filled, _demodulated(first, np.array(finer_lights))[0], 0)
+    again = fit_beat(finer.u, finer.v, finer_swing[None], finer.grid)
+    _check_alike(photos.name, beat, again)
     doubt = _corner_covariance(beat, blocks, corners, len(colours))
     doubt[2:, 2:] += _SHARED_FLOOR**2 * np.eye(len(colours))
     return Measured(
@@ -189,6 +198,23 @@ def _check(name: str, beat: Beat, modulation: float) -> None:
             name,
             f"two sets of fringes are alike (the second {beat.rival:.2f} of the first, should be "
             f"below {MOST_RIVAL:g})",
+        )
+
+
+def _finer(grid: tuple[int, int]) -> tuple[int, int]:
+    """Blocks of another size, in which fringes finer than two blocks would seem others."""
+    rows, columns = grid
+    return rows * 4 // 3 + 1, columns * 4 // 3 + 1
+
+
+def _check_alike(name: str, beat: Beat, again: Beat) -> None:
+    """Raise PictureError for fringes that depend on the blocks in which they are sought."""
+    apart = max(abs(p - q) for p, q in zip(beat.slopes, again.slopes, strict=True))
+    if apart > _ALIKE_FRINGES:
+        raise _undetermined(
+            name,
+            f"its fringes are too fine to follow, {abs(beat.slopes[0]):.1f} or "
+            f"{abs(again.slopes[0]):.1f} across: the guess is too far off, come nearer by eye",
         )
 
 

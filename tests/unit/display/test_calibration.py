@@ -283,6 +283,10 @@ def test_what_does_not_determine_the_lenses_is_refused(
         with pytest.raises(PictureError, match=why):
             fit([changed], guess)
 
+    far = guess_for(Panel(), lenses=15)
+    too_fine = replace(photo_set(Panel(), Camera(), far, 9, harmonics=(1,)), name="far")
+    with pytest.raises(PictureError, match="too fine to follow"):
+        fit([too_fine], far)
     walls = [(step, name, lambda: wall((600, 400), rng)) for step, name, _ in photos.shots]
     blank_wall = replace(photos, shots=walls, white=("white", walls[0][2]))
     refused(blank_wall, "white: no bright panel on a darker ground")
