@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from lfd_render.display import DisplayProfile, ViewGrid, slot_from_eye
 from lfd_render.display.model import MAX_VIEWS
 from lfd_render.display.rig import check_angle
-from lfd_render.errors import PictureError, UsageError
+from lfd_render.errors import PictureError, ResourceError, UsageError
 
 Pixels = NDArray[np.uint8]
 Float32 = NDArray[np.float32]
@@ -41,6 +41,7 @@ Optics = Literal["rig", "slab"]
 
 OPTICS = ("rig", "slab")
 CUT_SIGMAS = 3.0  # where a Gaussian response ends
+MOST_SEEN_PIXELS = 1 << 24  # of an eye's picture: twice a 4K panel's
 
 # Encoded 8-bit value → scene-linear light (IEC 61966-2-1).
 _CODES = np.arange(256) / 255
@@ -105,6 +106,11 @@ def look_from(
     out_columns, out_rows = size_px or (columns, grid.rows)
     if min(out_columns, out_rows) < 1:
         raise UsageError(f"view size is {out_columns} x {out_rows}; it should be at least 1 x 1")
+    if out_columns * out_rows > MOST_SEEN_PIXELS:
+        raise ResourceError(
+            f"view size: {out_columns} x {out_rows} are more than {MOST_SEEN_PIXELS} pixels; "
+            "the panel shows far fewer, use a smaller one"
+        )
 
     wanted = seen_phases(profile, grid, eye_mm, optics)
     x, y, miss = nearest_subpixels(profile, grid, wanted)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -267,6 +267,15 @@ class RenderOptions:
                 f"splat '{self.splat}': technique '{self.technique}' does not splat; "
                 "use it with lfdpr"
             )
+
+
+def choose(views: int | Literal["continuous"] | None, options: dict[str, Any]) -> RenderOptions:
+    """Options from a call's keywords. Raises UsageError for a name that is none."""
+    names = [field.name for field in fields(RenderOptions) if field.name != "views"]
+    for name in options:
+        if name not in names:
+            raise UsageError(f"option '{name}': unknown; use {', '.join(names)}")
+    return RenderOptions(views=views, **options)
 
 
 def _is_number(value: object) -> bool:

@@ -28,7 +28,7 @@ from lfd_render.passes.placement import Placement
 from lfd_render.passes.prefilter import Prefilter
 from lfd_render.passes.view_target import ViewTarget
 from lfd_render.renderer.frames import PanelFrames, Progress, Timings
-from lfd_render.renderer.options import RenderOptions
+from lfd_render.renderer.options import RenderOptions, choose
 from lfd_render.renderer.plan import ViewPlan, plan_panel, plan_views, upright_size
 from lfd_render.renderer.stage import REPEAT_TURN_RAD, Stage, check_frame, check_in_front
 from lfd_render.scene import Environment, Pose, Scene
@@ -100,7 +100,7 @@ class Renderer:
         Raises SceneError, UsageError, ResourceError or GpuError.
         """
         _check_kinds(scene, display, camera, pose)
-        choice = RenderOptions(views=views, **options)
+        choice = choose(views, options)
         camera = camera or camera_for(scene, display)
         self._end_other_stage(scene, display, choice)
         with self._call():
@@ -126,7 +126,7 @@ class Renderer:
         the new ones; asked for others it ends the one before.
         """
         _check_kinds(scene, display, camera)
-        choice = RenderOptions(views=views, **options)
+        choice = choose(views, options)
         self._end_other_stage(scene, display, choice)
         with self._call():
             stage = self._staged(scene, display, camera or camera_for(scene, display), choice)
@@ -197,7 +197,7 @@ class Renderer:
         size is by default one column a lens and the default rows. Otherwise as `render`.
         """
         _check_kinds(scene, display, camera, pose)
-        choice = RenderOptions(views=views, **options)
+        choice = choose(views, options)
         if choice.views == "continuous":
             raise UsageError("views 'continuous': is for panel images; give a number")
         if rig is not None and choice.supersample[1] > 1:

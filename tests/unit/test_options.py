@@ -7,6 +7,7 @@ import pytest
 from lfd_render.errors import UsageError
 from lfd_render.passes.sampling import DEFAULT_SAMPLING, PAPER_SAMPLING
 from lfd_render.renderer import RenderOptions
+from lfd_render.renderer.options import choose
 
 
 def test_presets_choose_the_sampling() -> None:
@@ -71,3 +72,9 @@ def test_what_cannot_be_says_so(options: dict[str, object], message: str) -> Non
 def test_what_is_of_the_wrong_kind_says_so(options: dict[str, object], message: str) -> None:
     with pytest.raises(UsageError, match=message):
         RenderOptions(**options)
+
+
+def test_a_name_that_is_no_option_is_named() -> None:
+    assert choose(3, {"seed": 5}) == RenderOptions(views=3, seed=5)
+    with pytest.raises(UsageError, match="option 'sed': unknown; use view_size, technique"):
+        choose(3, {"sed": 5})

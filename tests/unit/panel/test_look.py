@@ -7,7 +7,7 @@ import pytest
 
 from lfd_render.display import DisplayProfile, ViewGrid, shipped_profiles
 from lfd_render.display.model import Cells, Panel
-from lfd_render.errors import PictureError, UsageError
+from lfd_render.errors import PictureError, ResourceError, UsageError
 from lfd_render.panel.look import look, look_from, nearest_subpixels, seen_slot
 
 VIEWS = 48
@@ -148,6 +148,8 @@ def test_bad_requests_are_named() -> None:
             look(eia, profile, angle)
     with pytest.raises(UsageError, match="view size is 0 x 9"):
         look(eia, profile, 0.0, size_px=(0, 9))
+    with pytest.raises(ResourceError, match="view size: 20000 x 9000 are more than"):
+        look(eia, profile, 0.0, size_px=(20000, 9000))
     with pytest.raises(UsageError, match="views is 0"):
         look(eia, profile, 0.0, views=0)
 
