@@ -275,8 +275,9 @@ def _to_leia(lens: Numbers, at: Setting) -> dict[str, Decimal]:
 
 
 def _settled(center: Decimal) -> Decimal:
-    """A difference of large numbers without its last digits, so that 0 comes back as 0."""
-    return center.quantize(Decimal("1e-30"))
+    """A difference of large numbers without its last digits, so that 0 comes back as 0; of one that
+    is itself too large for so many digits nothing is lost."""
+    return center if abs(center) >= 10**15 else center.quantize(Decimal("1e-30"))
 
 
 def _red(at: Setting) -> Decimal:

@@ -143,3 +143,15 @@ def test_spoilt_texts_of_any_format_are_read_or_refused(
 
 def test_every_format_is_tried() -> None:
     assert {*LOST, "3d-global"} == set(WRITERS)
+
+
+@pytest.mark.parametrize(("name", "field"), [("van-berkel", "tan_alpha"), ("leia", "m_y")])
+def test_a_center_beyond_all_digits_is_refused(name: str, field: str) -> None:
+    """It came out of numbers that each may be so large, and had no place for its digits."""
+    data = json.loads(convert(DisplayProfile.load("looking-glass-portrait-sample-a"), name).text)
+    data["numbers"][field] = 9e11
+    for key in ("subpixels_per_lens", "m_x", "m_c"):
+        if key in data["numbers"]:
+            data["numbers"][key] *= 1e-9
+    with pytest.raises(ProfileError):
+        DisplayProfile.from_json(json.dumps(data), "p")
