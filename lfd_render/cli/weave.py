@@ -36,6 +36,10 @@ def weave(
     format: options.FormatOption = None,
     display: options.DisplayOption = options.DEFAULT_DISPLAY,
     tiles: options.TilesOption = None,
+    lookup: options.LookupOption = options.Lookup.LENS,
+    weave: options.WeavingOption = options.Weaving.NEAREST,
+    aa: options.FilterOption = options.Filter.NONE,
+    aa_light: options.FilterLightOption = options.FilterLight.LINEAR,
     device: options.DeviceOption = "auto",
     json: options.JsonOption = False,
 ) -> None:
@@ -54,7 +58,14 @@ def weave(
     from lfd_render.renderer import Renderer  # noqa: PLC0415 (keeps --help quick)
 
     with progress("Weaving"), Renderer(device=device) as renderer:
-        eia = renderer.weave(views, profile)
+        eia = renderer.weave(
+            views,
+            profile,
+            lookup=lookup.value,
+            weave=weave.value,
+            aa=(aa or options.Filter.NONE).value,
+            aa_light=aa_light.value,
+        )
     with watch.span("encode"), progress("Writing"):
         write_picture(output, lambda file: eia.save(file, kind))
 

@@ -46,7 +46,9 @@ class Eia:
                 write_png(path, stored(self.pixels, self.mount), self.metadata)
             case "exr":
                 if self.linear is None:
-                    raise OutputError(f"{path}: linear light was not asked for; give .png or .raw")
+                    raise OutputError(
+                        f"{path}: the panel image holds no linear light, which .exr needs; give .png or .raw"
+                    )
                 write_exr(path, stored(self.linear, self.mount), self.metadata)
             case "raw":
                 write_raw(path, stored(self.pixels, self.mount), self.metadata)

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lfd_render.display import Camera, DisplayProfile, Rig, ViewGrid
+from lfd_render.display import Camera, DisplayProfile, Reconstruction, Rig, ViewGrid
 from lfd_render.errors import ResourceError, SceneError, UsageError
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
@@ -19,7 +19,7 @@ from lfd_render.gpu.lighting import EnvironmentMap
 from lfd_render.gpu.scene_buffers import SceneBuffers
 from lfd_render.panel.eia import Eia, eia_metadata
 from lfd_render.panel.quilt import Quilt
-from lfd_render.panel.stage import PanelOptions
+from lfd_render.panel.stage import LIGHTS, PanelOptions
 from lfd_render.panel.unweave import Unwoven
 from lfd_render.panel.weaving import check_views, weave_pictures
 from lfd_render.passes.average import Average
@@ -258,13 +258,22 @@ class Renderer:
         views: NDArray[np.uint8] | Quilt | Unwoven,
         display: DisplayProfile,
         grid: ViewGrid | None = None,
+        *,
+        lookup: str = "lens",
+        weave: str = "nearest",
+        aa: str = "none",
+        aa_light: str = "linear",
     ) -> Eia:
         """Weave pictures of views into the panel image of a display: a quilt, unwoven views, or
         uint8 [view, y, x, 3] in sRGB, view 0 leftmost, upright unless `grid` says otherwise.
 
-        Between columns of upright views light is mixed; views that follow the lenses keep their
-        very codes. Raises UsageError for arrays that are no views, ResourceError or GpuError.
+        lookup, weave, aa, aa_light: as in RenderOptions. By default light is mixed between columns
+        of upright views, and views that follow the lenses keep their very codes. Raises UsageError
+        for arrays that are no views and unknown choices, ResourceError or GpuError.
         """
+        rule = Reconstruction(lookup, weave, aa)
+        if aa_light not in LIGHTS:
+            raise UsageError(f"aa light '{aa_light}': unknown; use {' or '.join(LIGHTS)}")
         if not isinstance(display, DisplayProfile):
             raise UsageError(f"display: {display!r}; give a DisplayProfile, as its load(…) makes")
         if not isinstance(views, np.ndarray | Quilt | Unwoven):
@@ -282,7 +291,9 @@ class Renderer:
             pixels, linear = timings.measure(
                 "weave",
                 self.device,
-                lambda: weave_pictures(self.device, pictures, display, grid),
+                lambda: weave_pictures(
+                    self.device, pictures, display, grid, rule=rule, light=aa_light
+                ),
             )
         report = {
             "views": count,
@@ -293,7 +304,16 @@ class Renderer:
             "warnings": [],
             "timings_ms": timings.summary(),
         }
-        metadata = eia_metadata(display, count, grid, technique="weave")
+        metadata = eia_metadata(
+            display,
+            count,
+            grid,
+            technique="weave",
+            lookup=lookup,
+            weave=weave,
+            aa=aa,
+            aa_light=aa_light,
+        )
         return Eia(pixels, linear, report, metadata, display.panel.mount)
 
     @contextmanager

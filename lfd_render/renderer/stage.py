@@ -173,7 +173,9 @@ class Stage:
             lookup=plan.rule.lookup,
             weave=plan.rule.weave,
             aa=plan.rule.aa,
+            aa_light=choice.aa_light,
             supersample="x".join(map(str, choice.supersample)),
+            **(asdict(choice.sampling) if choice.technique == "lfdpr" else {}),
         )
         return Eia(pixels, linear, report, metadata, self.display.panel.mount)
 

@@ -112,8 +112,8 @@ class FakeRenderer:
         shades = np.arange(count, dtype=np.uint8)[:, None, None, None]
         return np.broadcast_to(shades, (count, 14, 24, 3))
 
-    def weave(self, views: Quilt | Unwoven, display: DisplayProfile) -> Eia:
-        self._record(views=views, display=display)
+    def weave(self, views: Quilt | Unwoven, display: DisplayProfile, **choices: str) -> Eia:
+        self._record(views=views, display=display, **choices)
         width, height = display.resolution_px
         pixels = np.full((height, width, 3), 127, np.uint8)
         report = {"views": len(views.views), "warnings": [], "timings_ms": {"weave": 1.0}}

@@ -98,10 +98,17 @@ def test_a_quilt_becomes_a_panel_image(
     path = Quilt(views, 4, 2, 16 / 9).save(tmp_path / "q")
     out = tmp_path / "eia.png"
     result = command("weave", path, "-o", out, "-d", display, "--json")
-    np.testing.assert_array_equal(renderer.calls[0]["views"].views, views)
+    call = renderer.calls[0]
+    np.testing.assert_array_equal(call["views"].views, views)
+    rule = {name: call[name] for name in ("lookup", "weave", "aa", "aa_light")}
+    assert rule == {"lookup": "lens", "weave": "nearest", "aa": "none", "aa_light": "linear"}
     assert read_picture(out).shape == (PANEL[1], PANEL[0], 3)
     assert (result.json["views"], result.json["warnings"]) == (8, [])
     assert list(result.json["timings_ms"]) == ["load", "weave", "encode", "total"]
+    chosen = ("--lookup", "subpixel", "--aa", "both", "--aa-light", "encoded")
+    assert command("weave", path, "-o", out, "-d", display, *chosen).code == 0
+    assert renderer.calls[1]["lookup"] == "subpixel"
+    assert (renderer.calls[1]["aa"], renderer.calls[1]["aa_light"]) == ("both", "encoded")
     assert command("weave", path, "-o", tmp_path / "eia.exr", "-d", display).code == 0
     assert (tmp_path / "eia.exr").read_bytes()[:4] == b"\x76\x2f\x31\x01"
 

@@ -9,11 +9,12 @@ import pytest
 from numpy.typing import NDArray
 
 from lfd_render import Renderer, unweave
-from lfd_render.display import DisplayProfile, ViewGrid, shipped_profiles
+from lfd_render.display import DisplayProfile, Reconstruction, ViewGrid, shipped_profiles
 from lfd_render.errors import UsageError
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.scene_buffers import SceneBuffers
+from lfd_render.panel import weaving
 from lfd_render.panel.quilt import Quilt
 from lfd_render.passes.encode import Encode
 from lfd_render.passes.placement import Placement
@@ -177,6 +178,49 @@ def test_columns_of_upright_views_mix_in_linear_light(
     assert (found != codes).mean() < 0.15
     mixed_codes = woven(views.astype(float), profile, ViewGrid.upright(profile, 41, 24))
     assert np.abs(found - np.rint(mixed_codes)).max() > 10  # control: mixing codes differs
+
+
+RULES = (
+    {"aa": "spatial"},
+    {"aa": "angular"},
+    {"aa": "both", "lookup": "subpixel"},
+    {"weave": "linear"},
+)
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: "-".join(rule.values()))
+@pytest.mark.parametrize("light", ["linear", "encoded"])
+def test_pictures_weave_through_every_filter(
+    renderer: Renderer,
+    rng: np.random.Generator,
+    monkeypatch: pytest.MonkeyPatch,
+    rule: dict[str, str],
+    light: str,
+) -> None:
+    profile = few_lenses(PAPER, 37.7, (320, 210))
+    views = rng.integers(0, 256, (5, 24, 41, 3), dtype=np.uint8)
+    found = renderer.weave(views, profile, aa_light=light, **rule)
+    grid = ViewGrid.upright(profile, 41, 24)
+    given = linear_from_srgb(views) if light == "linear" else views.astype(float)
+    expected = woven(given, profile, grid, Reconstruction(**rule))
+    if light == "linear":
+        expected = 255 * srgb_from_linear(expected)
+    apart = np.abs(found.pixels - np.rint(expected))
+    # Rounding as above; where single precision puts a sample into the next column, any amount.
+    assert (apart > 1).mean() < 2e-4
+    assert (apart > 0).mean() < 0.15
+    plain = renderer.weave(views, profile).pixels.astype(float)
+    assert np.abs(found.pixels - plain).mean() > 5  # control: the rule changes the picture
+    assert (found.linear is None) == (light == "encoded")
+    # In bands of five rows, with the rows around them that the filter reaches.
+    rows = 5 + 2 * Reconstruction(**rule).halo
+    monkeypatch.setattr(weaving, "BAND_BYTES", 4 * 5 * 41 * rows)
+    banded = renderer.weave(views, profile, aa_light=light, **rule).pixels
+    np.testing.assert_array_equal(banded, found.pixels)
+    monkeypatch.setattr(Reconstruction, "halo", 0)  # planted fault
+    if rule.get("aa") in ("spatial", "both"):
+        bare = renderer.weave(views, profile, aa_light=light, **rule).pixels
+        assert (bare != found.pixels).any()
 
 
 @pytest.mark.parametrize("views", [1, 7])
