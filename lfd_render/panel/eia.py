@@ -47,7 +47,8 @@ class Eia:
             case "exr":
                 if self.linear is None:
                     raise OutputError(
-                        f"{path}: the panel image holds no linear light, which .exr needs; give .png or .raw"
+                        f"{path}: the panel image holds no linear light, as .exr does; give .png "
+                        "or .raw"
                     )
                 write_exr(path, stored(self.linear, self.mount), self.metadata)
             case "raw":
