@@ -8,7 +8,10 @@ from urllib.parse import parse_qsl
 
 from lfd_render.errors import SceneError
 from lfd_render.scene.model import Scene
+from lfd_render.scene.procedural.atrium import atrium
+from lfd_render.scene.procedural.car import car
 from lfd_render.scene.procedural.chart import chart
+from lfd_render.scene.procedural.coconuts import coconuts
 from lfd_render.scene.procedural.gallery import gallery
 from lfd_render.scene.procedural.spheres import spheres
 
@@ -27,10 +30,21 @@ class Builtin:
 _TRIANGLES = (1_000, 10_000_000)
 
 BUILTINS: dict[str, Builtin] = {
+    "atrium": Builtin(
+        atrium,
+        {"triangles": (20_000, 10_000_000), "textures": (16, 4096)},
+        {"triangles": 1_000_000, "textures": 1024},
+    ),
+    "car": Builtin(car, {"triangles": (20_000, 10_000_000)}, {"triangles": 300_000}),
     "chart": Builtin(chart, {"triangles": _TRIANGLES}, {"triangles": 100_000}),
+    "coconuts": Builtin(
+        coconuts,
+        {"triangles": (50_000, 10_000_000), "textures": (16, 8192)},
+        {"triangles": 2_000_000, "textures": 2048},
+    ),
     "gallery": Builtin(
         gallery,
-        {"triangles": _TRIANGLES, "textures": (16, 4096)},
+        {"triangles": _TRIANGLES, "textures": (16, 16384)},
         {"triangles": 1_000_000, "textures": 1024},
     ),
     "spheres": Builtin(spheres, {"triangles": _TRIANGLES}, {"triangles": 100_000}),

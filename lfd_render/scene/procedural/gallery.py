@@ -8,22 +8,23 @@ neighbouring views at most about two columns apart on a 27-inch display with a 4
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lfd_render.scene.model import Image, Instance, Material, Scene, TextureSlot
+from lfd_render.scene.model import Image, Material, Scene, TextureSlot
 from lfd_render.scene.procedural import materials as paint
-from lfd_render.scene.procedural.grid import Surface, SurfaceMap, tessellate
-from lfd_render.scene.procedural.shapes import frame, lathe, plane, rounded, sphere, torus_knot
-from lfd_render.scene.procedural.textures import TextureSet, to_pixels
+from lfd_render.scene.procedural.grid import Surface, SurfaceMap
+from lfd_render.scene.procedural.parts import Matrix, Parts, at, mapped, step, triples
+from lfd_render.scene.procedural.shapes import frame, plane, rounded, sphere, torus_knot
+from lfd_render.scene.procedural.textures import TextureSet, mosaic, to_pixels
 
 _HALF_WIDTH, _FLOOR, _CEILING, _BACK, _FRONT = 4.4, -1.4, 1.58, -3.25, 3.25
 _HEIGHT = _CEILING - _FLOOR
 _OVERLAP = 0.05
+_LARGEST_SET, _BESIDE_MOSAICS = 4096, 2048  # texels a side
 _STAND = _FLOOR - 0.01  # things sink in a little, so that no two faces coincide
 
 _SETS: dict[str, Callable[[int], TextureSet]] = {
@@ -45,34 +46,21 @@ _PAINTINGS = (
 _MATERIALS = (*_SETS, *(f"painting {i + 1}" for i in range(len(_PAINTINGS))))
 
 
-@dataclass
-class _Hall:
-    """Surfaces and where they stand; built up part by part, then tessellated at once."""
-
-    surfaces: list[Surface] = field(default_factory=list)
-    places: list[list[NDArray[np.float64]]] = field(default_factory=list)
-
-    def add(self, surface: Surface, *places: NDArray[np.float64]) -> None:
-        """Put a surface at one or more places; no place means the world's origin."""
-        self.surfaces.append(surface)
-        self.places.append(list(places) or [np.eye(4)])
-
-    def instances(self) -> Iterator[Instance]:
-        """All places in order."""
-        for i, (surface, places) in enumerate(zip(self.surfaces, self.places, strict=True)):
-            yield from (Instance(surface.name, i, place) for place in places)
-
-
 def gallery(triangles: int, textures: int) -> Scene:
-    """The hall with about `triangles` triangles and maps of `textures`² texels."""
-    hall = _Hall()
-    _add_room(hall)
+    """The hall with about `triangles` triangles and maps of `textures`² texels.
+
+    Above 4096 only the floor's are that large, a mosaic of slabs of which no two are alike, and
+    the others are of 2048² texels.
+    """
+    hall = Parts(_MATERIALS)
+    blocks = max(1, textures // _LARGEST_SET)
+    _add_room(hall, blocks)
     _add_columns(hall)
     _add_sculptures(hall)
     _add_pictures(hall)
     _add_lamps(hall)
-    meshes = tessellate(hall.surfaces, [len(p) for p in hall.places], triangles)
-    materials, images = _materials(textures)
+    meshes = hall.meshes(triangles)
+    materials, images = _materials(textures // blocks, blocks)
     return Scene(
         name="gallery",
         meshes=tuple(meshes),
@@ -89,13 +77,13 @@ def gallery(triangles: int, textures: int) -> Scene:
     )
 
 
-def _add_room(hall: _Hall) -> None:
+def _add_room(hall: Parts, blocks: int) -> None:
     # Each surface reaches a little beyond the next, so that no gap opens along their edges.
     w, low, high = _HALF_WIDTH + _OVERLAP, _FLOOR - _OVERLAP, _CEILING + _OVERLAP
     back, front = _BACK - _OVERLAP, _FRONT + _OVERLAP
     d, h = front - back, high - low
     floor = plane((-w, _FLOOR, back), (2 * w, 0, 0), (0, 0, d))
-    hall.add(_wall("floor", "floor", floor, (2 * w, d), 2.0))
+    hall.add(_wall("floor", "floor", floor, (2 * w, d), 2.0 * blocks))
     ceiling = plane((-w, _CEILING, front), (2 * w, 0, 0), (0, 0, -d), _coffers)
     hall.add(_wall("ceiling", "plaster", ceiling, (2 * w, d), 2.0, detail=1.5))
     far = plane((-w, high, _BACK), (2 * w, 0, 0), (0, -h, 0), _niche)
@@ -128,29 +116,22 @@ def _wall(
     )
 
 
-def _step(value: NDArray[np.float32], start: float, width: float) -> NDArray[np.float32]:
-    """A smooth step from 0 to 1 that begins at `start`."""
-    t = np.clip((value - np.float32(start)) / np.float32(width), 0.0, 1.0)
-    smooth: NDArray[np.float32] = t * t * (3 - 2 * t)
-    return smooth
-
-
 def _coffers(u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[np.float32]:
     """Beams 0.17 m deep round recessed fields, 6 across and 4 along the hall."""
     across = np.abs((u * 6) % 1 - np.float32(0.5))
     along = np.abs((v * 4) % 1 - np.float32(0.5))
     edge = np.maximum(across, along)
-    beams = np.float32(0.12) * _step(edge, 0.34, 0.04)
-    relief: NDArray[np.float32] = beams + np.float32(0.05) * _step(edge, 0.26, 0.03)
+    beams = np.float32(0.12) * step(edge, 0.34, 0.04)
+    relief: NDArray[np.float32] = beams + np.float32(0.05) * step(edge, 0.26, 0.03)
     return relief
 
 
 def _wainscot(v: NDArray[np.float32]) -> NDArray[np.float32]:
     """Skirting, dado rail and cornice, in metres from the wall; v runs down its height."""
     y = v * np.float32(_HEIGHT + 2 * _OVERLAP) - np.float32(_OVERLAP)
-    cornice = np.float32(0.16) * (1 - _step(y, 0.10, 0.14))
-    rail = np.float32(0.05) * _step(y, 2.10, 0.03) * (1 - _step(y, 2.19, 0.04))
-    skirting = np.float32(0.06) * _step(y, 2.76, 0.05)
+    cornice = np.float32(0.16) * (1 - step(y, 0.10, 0.14))
+    rail = np.float32(0.05) * step(y, 2.10, 0.03) * (1 - step(y, 2.19, 0.04))
+    skirting = np.float32(0.06) * step(y, 2.76, 0.05)
     relief: NDArray[np.float32] = cornice + rail + skirting
     return relief
 
@@ -173,82 +154,43 @@ def _niche(u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[np.float32
     above = np.maximum(y - np.float32(0.28), 0.0)
     radius = np.hypot(x, above)
     hollow = np.float32(0.7) * np.sqrt(np.clip(1 - (radius / np.float32(0.85)) ** 2, 0.0, 1.0))
-    hollow *= _step(y, -1.12, 0.04)
-    rim = np.float32(0.06) * (_step(radius, 0.85, 0.03) - _step(radius, 0.98, 0.05))
-    relief: NDArray[np.float32] = _wainscot(v) * _step(radius, 0.85, 0.02) + rim - hollow
+    hollow *= step(y, -1.12, 0.04)
+    rim = np.float32(0.06) * (step(radius, 0.85, 0.03) - step(radius, 0.98, 0.05))
+    relief: NDArray[np.float32] = _wainscot(v) * step(radius, 0.85, 0.02) + rim - hollow
     return relief
 
 
-def _at(x: float, y: float, z: float, yaw_deg: float = 0.0) -> NDArray[np.float64]:
-    """`world_from_local` of a turn about y and a move."""
-    angle = np.deg2rad(yaw_deg)
-    matrix = np.eye(4)
-    matrix[0, 0] = matrix[2, 2] = np.cos(angle)
-    matrix[0, 2], matrix[2, 0] = np.sin(angle), -np.sin(angle)
-    matrix[:3, 3] = (x, y, z)
-    return matrix
-
-
-def _turned(
-    name: str,
-    material: str,
-    profile: list[tuple[float, float]],
-    *,
-    square: bool = False,
-    flutes: int = 0,
-    detail: float = 4.0,
-    least: tuple[int, int] = (5, 4),
-    tile: float = 0.8,
-) -> Surface:
-    """A lathe's surface with texture tiles of about `tile` metres that close round it."""
-    radii, heights = np.array(profile).T
-    around = 2 * np.pi * float(radii.max()) * (4 / np.pi if square else 1)
-    down = float(np.hypot(np.diff(radii), np.diff(heights)).sum())
-    return Surface(
-        name,
-        lathe(profile, square=square, flutes=flutes),
-        (around, down),
-        _MATERIALS.index(material),
-        closed_u=True,
-        poles=True,
-        uv_scale=(max(1, round(around / tile)), down / tile),
-        detail=detail,
-        least=least,
-        corners=4 if square else 1,
-    )
-
-
-def _add_columns(hall: _Hall) -> None:
+def _add_columns(hall: Parts) -> None:
     top = _HEIGHT + 0.03
     profile = [
         (0.0, top), (0.36, top), (0.36, top - 0.11), (0.29, top - 0.18), (0.26, top - 0.28),
         (0.21, top - 0.31), (0.25, 0.36), (0.32, 0.29), (0.28, 0.22), (0.36, 0.14),
         (0.36, 0.0), (0.0, 0.0),
     ]  # fmt: skip
-    column = _turned("column", "marble", profile, flutes=20, least=(4, 4), detail=3.0)
+    column = hall.turned("column", "marble", profile, flutes=20, least=(4, 4), detail=3.0)
     spots = ((3.1, -2.5), (3.05, -0.8), (3.65, 2.4))
-    places = [_at(side * x, _STAND, z) for x, z in spots for side in (-1, 1)]
+    places = [at(side * x, _STAND, z) for x, z in spots for side in (-1, 1)]
     hall.add(column, *places)
 
 
-def _plinth(hall: _Hall, height: float, half: float, *places: NDArray[np.float64]) -> None:
+def _plinth(hall: Parts, height: float, half: float, *places: Matrix) -> None:
     profile = [
         (0.0, height), (half, height), (half, height - 0.06), (0.85 * half, height - 0.10),
         (0.80 * half, 0.16), (half, 0.10), (half, 0.0), (0.0, 0.0),
     ]  # fmt: skip
-    hall.add(_turned("plinth", "granite", profile, square=True, least=(4, 3)), *places)
+    hall.add(hall.turned("plinth", "granite", profile, square=True, least=(4, 3)), *places)
 
 
-def _add_sculptures(hall: _Hall) -> None:
-    _plinth(hall, 0.72, 0.33, _at(-1.35, _STAND, 0.70, 20), _at(1.42, _STAND, 0.35, -15))
-    hall.add(_knot("bronze knot", "bronze", (2, 3), 0.46, 0.13), _at(-1.35, -0.14, 0.70, 25))
+def _add_sculptures(hall: Parts) -> None:
+    _plinth(hall, 0.72, 0.33, at(-1.35, _STAND, 0.70, 20), at(1.42, _STAND, 0.35, -15))
+    hall.add(_knot("bronze knot", "bronze", (2, 3), 0.46, 0.13), at(-1.35, -0.14, 0.70, 25))
     bumpy = _round("gilt planet", "gilt", 0.46, bumps=_bumps)
-    hall.add(bumpy, _at(1.42, -0.24, 0.35))
-    _plinth(hall, 0.42, 0.42, _at(0.0, _STAND, -0.95, 45))
-    hall.add(_knot("great knot", "gilt", (3, 4), 0.54, 0.09), _at(0.0, -0.37, -0.95, -20))
-    _plinth(hall, 0.80, 0.28, _at(-2.35, _STAND, -1.35), _at(2.35, _STAND, -1.35))
-    hall.add(_vase(), *(_at(x, _STAND + 0.795, -1.35) for x in (-2.35, 2.35)))
-    hall.add(_figure(), _at(0.0, _STAND, _BACK - 0.15))
+    hall.add(bumpy, at(1.42, -0.24, 0.35))
+    _plinth(hall, 0.42, 0.42, at(0.0, _STAND, -0.95, 45))
+    hall.add(_knot("great knot", "gilt", (3, 4), 0.54, 0.09), at(0.0, -0.37, -0.95, -20))
+    _plinth(hall, 0.80, 0.28, at(-2.35, _STAND, -1.35), at(2.35, _STAND, -1.35))
+    hall.add(_vase(hall), *(at(x, _STAND + 0.795, -1.35) for x in (-2.35, 2.35)))
+    hall.add(_figure(hall), at(0.0, _STAND, _BACK - 0.15))
 
 
 def _knot(
@@ -299,35 +241,35 @@ def _bumps(u: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[np.float32
     return faded
 
 
-def _vase() -> Surface:
+def _vase(hall: Parts) -> Surface:
     profile = [
         (0.0, 0.72), (0.09, 0.72), (0.13, 0.76), (0.11, 0.68), (0.08, 0.58), (0.17, 0.48),
         (0.22, 0.38), (0.20, 0.26), (0.12, 0.12), (0.09, 0.06), (0.13, 0.0), (0.0, 0.0),
     ]  # fmt: skip
-    return _turned("vase", "bronze", rounded(profile), detail=6.0)
+    return hall.turned("vase", "bronze", rounded(profile), detail=6.0)
 
 
-def _figure() -> Surface:
+def _figure(hall: Parts) -> Surface:
     """A turned marble figure on its own drum, for the niche."""
     profile = [
         (0.0, 2.29), (0.08, 2.26), (0.12, 2.18), (0.11, 2.07), (0.06, 2.00), (0.08, 1.95),
         (0.22, 1.90), (0.25, 1.78), (0.19, 1.52), (0.15, 1.38), (0.21, 1.12), (0.29, 0.78),
         (0.32, 0.73), (0.40, 0.70), (0.40, 0.08), (0.46, 0.0), (0.0, 0.0),
     ]  # fmt: skip
-    return _turned("figure", "marble", rounded(profile))
+    return hall.turned("figure", "marble", rounded(profile))
 
 
-def _add_pictures(hall: _Hall) -> None:
+def _add_pictures(hall: Parts) -> None:
     width, height, y = 1.16, 0.90, 0.30
     offset = 0.09  # clear of the wall's mouldings
     side = _HALF_WIDTH - offset
     places = [
-        _at(-1.92, y, _BACK + offset),
-        _at(1.92, y, _BACK + offset),
-        _at(-side, y, -1.5, 90),
-        _at(side, y, -1.5, -90),
-        _at(-side, y, 0.9, 90),
-        _at(side, y, 0.9, -90),
+        at(-1.92, y, _BACK + offset),
+        at(1.92, y, _BACK + offset),
+        at(-side, y, -1.5, 90),
+        at(side, y, -1.5, -90),
+        at(-side, y, 0.9, 90),
+        at(side, y, 0.9, -90),
     ]
     rim = 0.12
     border = Surface(
@@ -351,21 +293,31 @@ def _add_pictures(hall: _Hall) -> None:
         hall.add(surface, *places[i :: len(_PAINTINGS)])
 
 
-def _add_lamps(hall: _Hall) -> None:
+def _add_lamps(hall: Parts) -> None:
     spots = [(-1.75, -0.6), (1.75, -0.6), (-0.62, -1.9), (0.62, -1.9)]
     globe = _round("lamp", "lamp", 0.15, uv_scale=(1.0, 1.0), least=(5, 3))
-    hall.add(globe, *(_at(x, 0.94, z) for x, z in spots))
+    hall.add(globe, *(at(x, 0.94, z) for x, z in spots))
     rod = [(0.0, 0.62), (0.10, 0.61), (0.012, 0.55), (0.012, 0.06), (0.05, 0.0), (0.0, 0.0)]
-    surface = _turned("lamp rod", "gilt", rod, detail=8.0, least=(3, 3), tile=0.3)
-    hall.add(surface, *(_at(x, 1.05, z) for x, z in spots))
+    surface = hall.turned("lamp rod", "gilt", rod, detail=8.0, least=(3, 3), tile=0.3)
+    hall.add(surface, *(at(x, 1.05, z) for x, z in spots))
 
 
-def _materials(size: int) -> tuple[tuple[Material, ...], tuple[Image, ...]]:
-    """Materials in the order of their names, and their pictures, made on two threads."""
+def _materials(size: int, blocks: int) -> tuple[tuple[Material, ...], tuple[Image, ...]]:
+    """Materials in the order of their names, and their pictures, made on two threads.
+
+    size: texels a side of a block, of which the floor has `blocks` each way.
+    """
+    beside = size if blocks == 1 else _BESIDE_MOSAICS
+
+    def make(name: str) -> tuple[Image, Image, Image]:
+        if name == "floor":
+            return mosaic(lambda seed: paint.floor_tiles(size, seed).images(), blocks)
+        return (_SETS | {"canvas": paint.canvas})[name](beside).images()
+
     with ThreadPoolExecutor(2) as pool:
-        sets = list(pool.map(lambda make: make(size).images(), (*_SETS.values(), paint.canvas)))
-        pictures = list(pool.map(lambda p: to_pixels(paint.painting(size, *p)), _PAINTINGS))
-    images = [image for triple in sets[:-1] for image in triple]
+        sets = list(pool.map(make, (*_SETS, "canvas")))
+        pictures = list(pool.map(lambda p: to_pixels(paint.painting(beside, *p)), _PAINTINGS))
+    images = list(triples(sets[:-1]))
     materials = [_material(name, 3 * i, 3 * i + 1) for i, name in enumerate(_SETS)]
     weave = len(images)  # the canvas's own colour is not used
     images += sets[-1][1:]
@@ -376,14 +328,6 @@ def _materials(size: int) -> tuple[tuple[Material, ...], tuple[Image, ...]]:
 
 
 def _material(name: str, color: int, maps: int) -> Material:
-    """A material of the images `color`, `maps` (its normals) and the one after (its ORM)."""
-    lit = name == "lamp"
-    return Material(
-        name,
-        emissive=(6.0, 5.0, 3.4) if lit else (0.0, 0.0, 0.0),
-        base_color_texture=TextureSlot(color),
-        normal_texture=TextureSlot(maps),
-        occlusion_texture=TextureSlot(maps + 1),
-        metallic_roughness_texture=TextureSlot(maps + 1),
-        emissive_texture=TextureSlot(color) if lit else None,
-    )
+    if name != "lamp":
+        return mapped(name, color, maps)
+    return mapped(name, color, maps, emissive=(6.0, 5.0, 3.4), emissive_texture=TextureSlot(color))

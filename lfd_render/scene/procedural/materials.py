@@ -1,4 +1,4 @@
-"""The texture sets of the gallery: marble, granite, damask, plaster, metals, canvas, paintings."""
+"""The texture sets of the built-in scenes: stone, cloths, plaster, metals, paintings, husks."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from lfd_render.scene.procedural.textures import Field, TextureSet, grid, mix, n
 _PI = np.float32(np.pi)
 
 
-def floor_tiles(size: int) -> TextureSet:
+def floor_tiles(size: int, seed: int = 11) -> TextureSet:
     """Four by four polished marble tiles, black and cream, with sunken joints."""
     u, v = grid(size)
     tiles = 4
@@ -17,8 +17,8 @@ def floor_tiles(size: int) -> TextureSet:
     dark = ((across.astype(np.int32) + down.astype(np.int32)) % 2).astype(np.float32)
     edge = np.minimum(np.minimum(across % 1, 1 - across % 1), np.minimum(down % 1, 1 - down % 1))
     joint = np.clip(1.0 - edge / np.float32(0.012), 0.0, 1.0).astype(np.float32)
-    veins = _veins(size, 11, 2.0)
-    clouds = noise(size, 12, 1.8)
+    veins = _veins(size, seed, 2.0)
+    clouds = noise(size, seed + 1, 1.8)
     light = mix(rgb("e6dcc8"), rgb("a58a66"), 0.65 * veins + 0.06 * clouds)
     black = mix(rgb("1d1b1e"), rgb("b9ad9a"), 0.55 * np.roll(veins, size // 3, axis=1) ** 2)
     color = mix(mix(light, black, dark), rgb("4a4238"), joint)
@@ -77,6 +77,89 @@ def granite(size: int) -> TextureSet:
     color = mix(rgb("34343a"), rgb("9a948e"), 0.35 * grain + 0.12)
     color = mix(color, rgb("120f12"), 1.4 * flakes - 1.1)
     return TextureSet("granite", color, 0.0004 * grain, 0.38 + 0.06 * flakes)
+
+
+def _bonded(size: int, across: int, down: int, joint: float) -> tuple[Field, Field]:
+    """Blocks in running bond: 1 in the joints and 0 off them, and a number of its own a block."""
+    u, v = grid(size)
+    row = (v * down).astype(np.int32)
+    x = u * across + 0.5 * (row % 2)
+    edge_x = np.minimum(x % 1, 1 - x % 1) / across
+    edge_y = np.minimum(v * down % 1, 1 - v * down % 1) / down
+    line = np.clip(2.0 - np.minimum(edge_x, edge_y) / np.float32(joint), 0.0, 1.0)
+    column = (x % across).astype(np.int32)
+    tone = np.random.default_rng(across * 100 + down).random((down, across), np.float32)
+    return line.astype(np.float32), tone[row, column]
+
+
+def ashlar(size: int) -> TextureSet:
+    """Sandstone blocks of slightly different colours, tooled and worn."""
+    joints, tone = _bonded(size, 4, 8, 0.004)
+    tooled, stains = noise(size, 101, 0.9, 10.0), noise(size, 102, 1.8)
+    color = mix(rgb("d8c49a"), rgb("b39468"), 0.7 * tone + 0.12 * stains + 0.08 * tooled)
+    color = mix(color, rgb("7d6a4e"), 0.8 * joints)
+    height = -0.003 * joints + 0.0007 * tooled
+    return TextureSet("ashlar", color, height.astype(np.float32), 0.88 + 0.03 * tooled)
+
+
+def brick(size: int) -> TextureSet:
+    """Old red bricks in wide joints."""
+    joints, tone = _bonded(size, 8, 24, 0.0035)
+    grain, stains = noise(size, 111, 0.8, 12.0), noise(size, 112, 1.7)
+    color = mix(rgb("9c5238"), rgb("6b2f24"), tone + 0.1 * grain)
+    color = mix(mix(color, rgb("c8b8a0"), 0.9 * joints), rgb("3a2a24"), 0.12 * stains)
+    height = -0.003 * joints + 0.0006 * grain
+    return TextureSet("brick", color, height.astype(np.float32), 0.9 + 0.03 * grain)
+
+
+def cloth(size: int, seed: int, ground: str, thread: str) -> TextureSet:
+    """Woven cloth with a border and rosettes in another thread."""
+    u, v = grid(size)
+    ornament = np.clip(_rosettes(u * 4, v * 4) + _rosettes(u * 4 + 0.5, v * 4 + 0.5), 0, 1)
+    border = np.maximum(np.abs(u - 0.5), np.abs(v - 0.5))
+    ornament = np.maximum(ornament * (border < 0.4), (np.abs(border - 0.43) < 0.012))
+    weft = np.sin(2 * _PI * 128 * v) * np.sin(2 * _PI * 128 * u)
+    worn = noise(size, seed, 1.5)
+    color = mix(rgb(ground), rgb(thread), ornament.astype(np.float32))
+    color *= (1.0 + 0.08 * weft + 0.05 * worn).astype(np.float32)
+    height = (0.0006 * ornament + 0.0002 * weft).astype(np.float32)
+    return TextureSet("cloth", color, height, (0.85 - 0.2 * ornament).astype(np.float32))
+
+
+def husk(size: int) -> TextureSet:
+    """A coconut's brown husk, combed by fibres that run down the texture."""
+    fibres = _combed(size, 121, 24)
+    stains = noise(size, 123, 1.7)
+    color = mix(rgb("8a5e34"), rgb("3d2614"), 0.45 + 0.3 * fibres + 0.1 * stains)
+    return TextureSet("husk", color, 0.002 * fibres, 0.9 + 0.03 * fibres)
+
+
+def frond(size: int) -> TextureSet:
+    """A palm leaf: ribs along the texture's v, yellow at its edges and tip."""
+    u, v = grid(size)
+    ribs = _combed(size, 131, 32)
+    middle = np.clip(1 - np.abs(u - 0.5) * 40, 0, 1)
+    green = mix(rgb("2f6a22"), rgb("6fa03a"), 0.4 + 0.2 * ribs + 0.3 * v)
+    color = mix(green, rgb("c4b45a"), middle + np.clip(v * 5 - 4.2, 0, 1) + 0 * ribs)
+    return TextureSet("frond", color, 0.001 * ribs, 0.45 + 0.05 * ribs)
+
+
+def flesh(size: int) -> TextureSet:
+    """The white of a coconut."""
+    grain, stains = noise(size, 141, 1.0, 8.0), noise(size, 142, 1.8)
+    color = mix(rgb("f6f1e4"), rgb("e2d8c0"), 0.4 + 0.2 * stains + 0.1 * grain)
+    return TextureSet("flesh", color, 0.0006 * grain, 0.5 + 0.05 * grain)
+
+
+def _combed(size: int, seed: int, stretch: int) -> Field:
+    """Tiling noise of deviation 1, drawn out `stretch` times along v."""
+    field = noise(size, seed, 0.7, 8.0)
+    rows = (np.arange(size) // stretch) % size
+    steps = noise(size, seed + 1, 1.6)[:, 0] * np.float32(3.0)
+    shift = np.rint(steps).astype(np.int64)
+    columns = (np.arange(size)[None, :] + shift[:, None]) % size
+    combed: Field = field[rows[:, None], columns]
+    return combed
 
 
 def bronze(size: int) -> TextureSet:

@@ -5,7 +5,7 @@ All noise is spectral, so every texture tiles; seeds are fixed, so every run giv
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -43,6 +43,27 @@ class TextureSet:
         # Hollows see less of the sky: depth below the smoothed surface, in 1/60 of a tile.
         occlusion = 1.0 + 60.0 * np.minimum(self.height - _smooth(self.height), 0.0)
         return to_pixels((occlusion, self.roughness, self.metallic))
+
+
+def mosaic(
+    make: Callable[[int], tuple[Image, Image, Image]], blocks: int, seed: int = 11
+) -> tuple[Image, Image, Image]:
+    """Pictures put together from `blocks` each way, each made from its own seed; the edges of
+    what is made should hide that neighbours do not fit."""
+    first = make(seed)
+    if blocks == 1:
+        return first
+    size = len(first[0].pixels)
+    wholes = [np.empty((blocks * size, blocks * size, 4), np.uint8) for _ in first]
+    for row, column in np.ndindex(blocks, blocks):
+        block = make(seed + 101 * (row * blocks + column)) if row + column else first
+        place = np.s_[row * size : (row + 1) * size, column * size : (column + 1) * size]
+        for whole, image in zip(wholes, block, strict=True):
+            whole[place] = image.pixels
+    color, normal, orm = (
+        Image(image.name, whole) for image, whole in zip(first, wholes, strict=True)
+    )
+    return color, normal, orm
 
 
 def to_pixels(channels: Field | Sequence[NDArray[np.floating] | float]) -> NDArray[np.uint8]:
