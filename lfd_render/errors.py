@@ -12,6 +12,18 @@ class UsageError(LfdError):
     """The request itself is contradictory or out of range."""
 
 
+class OptionError(UsageError):
+    """An option is out of range, or goes with none of the others. option: its name in Python, which
+    the command line and HTTP spell in their own way."""
+
+    def __init__(self, option: str, reason: str) -> None:
+        super().__init__(option, reason)
+        self.option, self.reason = option, reason
+
+    def __str__(self) -> str:
+        return f"{self.option}: {self.reason}"
+
+
 class SceneError(LfdError):
     """A scene, texture or camera cannot be read or makes no sense."""
 
@@ -26,6 +38,30 @@ class GpuError(LfdError):
 
 class ResourceError(LfdError):
     """The request needs more memory, texels or pixels than allowed."""
+
+
+class PoisonError(SceneError):
+    """Rendering a scene ends the process that does it."""
+
+
+class BusyError(ResourceError):
+    """More is asked for than the queue holds. retry_after_s: when to ask again."""
+
+    def __init__(self, message: str, retry_after_s: int = 1) -> None:
+        super().__init__(message)
+        self.retry_after_s = retry_after_s
+
+
+class DeadlineError(ResourceError):
+    """A picture took longer than it may."""
+
+
+class UnavailableError(GpuError):
+    """No render process takes work now: they are starting or going."""
+
+
+class CancelledError(LfdError):
+    """Whoever asked for a picture no longer wants it."""
 
 
 class PictureError(LfdError):
@@ -44,6 +80,7 @@ EXIT_CODES: dict[type[LfdError], int] = {
     ResourceError: 6,
     PictureError: 7,
     OutputError: 8,
+    CancelledError: 130,
 }
 EXIT_INTERNAL = 1
 EXIT_INTERRUPTED = 130
@@ -54,8 +91,11 @@ HTTP_STATUSES: dict[type[LfdError], int] = {
     ProfileError: 422,
     GpuError: 503,
     ResourceError: 413,
+    BusyError: 429,
+    DeadlineError: 504,
     PictureError: 422,
     OutputError: 507,
+    CancelledError: 503,
 }
 
 

@@ -23,11 +23,12 @@ Vec3 = tuple[float, float, float]
 
 FRAMED = 0.94  # of the window's width and height: a margin of 6 %
 DEPTH_RANGES = 2.0  # deepest framed scene, in comfortable ranges
+_TURNS = ("yaw", "pitch")
 _LEAST_SIZE = 1e-290  # of a framed scene: what is smaller, or larger than 1/this, overflows in mm
 
 
 class _CameraFile(StrictModel):
-    """JSON of a camera file; the last two are optional."""
+    """JSON of a camera file; the last three are optional."""
 
     target: Vec3
     eye_direction: Vec3
@@ -35,6 +36,7 @@ class _CameraFile(StrictModel):
     window_height: Annotated[float, Field(gt=0)]
     depth_scale: Annotated[float, Field(gt=0)] = 1.0
     yaw_deg: float = 0.0
+    pitch_deg: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -42,8 +44,9 @@ class Camera:
     """The window in the world: its centre, the direction to the viewer, up, and its height.
 
     `depth_scale` stretches depth about the window; `yaw_rad` turns the scene about the
-    window's up axis, positive with its right-hand side coming forward. Raises SceneError when
-    the numbers make no window.
+    window's up axis, positive with its right-hand side coming forward, and then `pitch_rad` about
+    the axis to the window's right, positive with its upper side coming forward. Raises SceneError
+    when the numbers make no window.
     """
 
     target: Vec3
@@ -52,6 +55,7 @@ class Camera:
     window_height: float
     depth_scale: float = 1.0
     yaw_rad: float = 0.0
+    pitch_rad: float = 0.0
 
     def __post_init__(self) -> None:
         vectors = {"target": self.target, "eye_direction": self.eye_direction, "up": self.up}
@@ -69,21 +73,25 @@ class Camera:
         for name, size in sizes.items():
             if not 0 < size < math.inf:
                 raise SceneError(f"camera: {name} is {size}; it should be above 0 and finite")
-        if not math.isfinite(self.yaw_rad):
-            raise SceneError(f"camera: yaw is {self.yaw_rad}; it should be finite")
+        for name, angle in (("yaw", self.yaw_rad), ("pitch", self.pitch_rad)):
+            if not math.isfinite(angle):
+                raise SceneError(f"camera: {name} is {angle}; it should be finite")
 
     def display_from_world(self, panel_mm: tuple[float, float]) -> Float64:
-        """World → display space in mm, [4, 4]: depth scale · yaw · scale · rotation · shift."""
+        """World → display space in mm, [4, 4]: depth scale · pitch · yaw · scale · rotation ·
+        shift."""
         toward = _unit(self.eye_direction)
         right = _unit(np.cross(_unit(self.up), toward))
         rotation = np.stack([right, np.cross(toward, right), toward])
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         yaw = np.array([[cos, 0.0, -sin], [0.0, 1.0, 0.0], [sin, 0.0, cos]])
+        cos, sin = math.cos(self.pitch_rad), math.sin(self.pitch_rad)
+        pitch = np.array([[1.0, 0.0, 0.0], [0.0, cos, -sin], [0.0, sin, cos]])
         depth = np.diag([1.0, 1.0, self.depth_scale])
         display_from_world = np.eye(4)
         with np.errstate(over="ignore", invalid="ignore"):
             scale = np.float64(panel_mm[1]) / self.window_height
-            display_from_world[:3, :3] = depth @ yaw @ rotation * scale
+            display_from_world[:3, :3] = depth @ pitch @ yaw @ rotation * scale
             display_from_world[:3, 3] = -display_from_world[:3, :3] @ np.array(self.target)
         if not np.isfinite(display_from_world).all():
             raise SceneError(
@@ -104,9 +112,9 @@ class Camera:
         except ValidationError as cause:
             raise SceneError(one_line(cause, source)) from cause
         fields = file.model_dump()
-        yaw_rad = math.radians(fields.pop("yaw_deg"))
+        turns = {f"{name}_rad": math.radians(fields.pop(f"{name}_deg")) for name in _TURNS}
         try:
-            return Camera(**fields, yaw_rad=yaw_rad)
+            return Camera(**fields, **turns)
         except SceneError as cause:
             raise SceneError(f"{source}: {cause}") from cause
 
@@ -118,7 +126,8 @@ class Camera:
     def to_json_dict(self) -> dict[str, Any]:
         """Plain data of a camera file that says the same."""
         data = asdict(self)
-        data["yaw_deg"] = math.degrees(data.pop("yaw_rad"))
+        for name in _TURNS:
+            data[f"{name}_deg"] = math.degrees(data.pop(f"{name}_rad"))
         return data
 
     @staticmethod
@@ -163,9 +172,12 @@ class Camera:
         window_height = 2 * focus_distance * math.tan(yfov_rad / 2)
         return Camera(_vec3(target), _vec3(toward), _vec3(up), window_height)
 
-    def turned(self, yaw_rad: float) -> Camera:
-        """This camera with the scene turned further, its right-hand side coming forward."""
-        return replace(self, yaw_rad=self.yaw_rad + yaw_rad)
+    def turned(self, yaw_rad: float, pitch_rad: float = 0.0) -> Camera:
+        """This camera with the scene turned further, its right-hand side and its upper side coming
+        forward."""
+        return replace(
+            self, yaw_rad=self.yaw_rad + yaw_rad, pitch_rad=self.pitch_rad + pitch_rad
+        )
 
     def with_depth_scale(self, factor: float) -> Camera:
         """This camera with depth about the window multiplied by a factor."""

@@ -11,7 +11,7 @@ s_i follow one of three rules:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, assert_never
 
 import numpy as np
@@ -40,6 +40,10 @@ class Rig:
     def views(self) -> int:
         """Number of eyes."""
         return len(self.eye_x_mm)
+
+    def only(self, view: int) -> Rig:
+        """The rig of one of its eyes."""
+        return replace(self, eye_x_mm=self.eye_x_mm[view : view + 1])
 
     def matrices(self) -> Float64:
         """`clip_from_display` of each view, [view, 4, 4], far plane at infinity.

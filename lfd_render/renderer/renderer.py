@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.display import Camera, DisplayProfile, Reconstruction, Rig, ViewGrid
-from lfd_render.errors import ResourceError, SceneError, UsageError
+from lfd_render.errors import CancelledError, ResourceError, SceneError, UsageError
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.lighting import EnvironmentMap
@@ -189,6 +189,7 @@ class Renderer:
         rig: Rig | None = None,
         *,
         pose: Pose | None = None,
+        progress: Progress | None = None,
         **options: Any,
     ) -> NDArray[np.uint8]:
         """Render single upright views, uint8 [view, y, x, 3], view 0 leftmost.
@@ -207,7 +208,9 @@ class Renderer:
         camera = camera or camera_for(scene, display)
         self._end_stage()
         with self._call():
-            return self._views(scene, display, camera, plan, choice, pose=pose)
+            return self._views(
+                scene, display, camera, plan, choice, pose=pose, progress=progress or _ignored
+            )
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -223,6 +226,7 @@ class Renderer:
         choice: RenderOptions,
         *,
         pose: Pose | None,
+        progress: Progress,
     ) -> NDArray[np.uint8]:
         grid = plan.grid
         _check_size(plan)
@@ -241,7 +245,8 @@ class Renderer:
             Placement(camera.display_from_world(display.size_mm), choice.background), clock
         )
         technique.warm_up(clock)  # which also makes room for the points of this very placement
-        for band in technique.target.bands:
+        for index, band in enumerate(target.bands):
+            progress(index / len(target.bands))
             technique.render(band, clock)
             found = average(band) if averaged else band.view_images()
             rows = slice(*found.shown)
@@ -326,8 +331,9 @@ class Renderer:
             with self.device.undoing():
                 yield
         except BaseException as error:
-            # What a bad scene, pose or camera finds standing stands, unless something was replaced.
-            harmless = isinstance(error, SceneError | UsageError)
+            # What a bad scene, pose or camera, or one who leaves, finds standing stands, unless
+            # something was replaced.
+            harmless = isinstance(error, SceneError | UsageError | CancelledError)
             if not (harmless and set(self.device.owned) == before):
                 self._end_stage()  # they may be among what was undone
                 self._drop_scene()

@@ -1,0 +1,92 @@
+"""Pictures as the bytes of a media type."""
+
+from __future__ import annotations
+
+import io
+import tempfile
+import zipfile
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from lfd_render.errors import UsageError
+from lfd_render.panel.formats import write_exr
+from lfd_render.panel.png import png_chunks
+
+PNG = "image/png"
+WEBP = "image/webp"
+JPEG = "image/jpeg"
+EXR = "image/x-exr"
+RAW = "application/octet-stream"
+ZIP = "application/zip"
+NPY = "application/x-npy"
+JSON = "application/json"
+
+MOST_WEBP_SIDE = 16383
+_JPEG_QUALITY = 92
+
+Pixels = NDArray[np.uint8]
+
+
+def encoded(
+    pixels: Pixels,
+    media: str,
+    text: Mapping[str, str] | None = None,
+    exif: bytes | None = None,
+) -> bytes:
+    """Bytes of uint8 [y, x, 3]: lossless but for JPEG. Text goes where the format has a place.
+
+    Raises UsageError for a picture that the format cannot hold.
+    """
+    match media:
+        case "image/png":
+            return b"".join(png_chunks(pixels, text, exif))
+        case "image/webp":
+            return _webp(pixels)
+        case "image/jpeg":
+            file = io.BytesIO()
+            Image.fromarray(pixels).save(file, "JPEG", quality=_JPEG_QUALITY, subsampling=0)
+            return file.getvalue()
+        case "application/octet-stream":
+            return np.ascontiguousarray(pixels).tobytes()
+    raise UsageError(f"media type '{media}': is none of this picture's")
+
+
+def exr(linear: NDArray[np.float16], text: Mapping[str, str]) -> bytes:
+    """OpenEXR of scene-linear half floats [y, x, 3]."""
+    with tempfile.TemporaryDirectory(prefix="lfd-render-") as folder:
+        file = Path(folder) / "picture.exr"  # the library writes files alone
+        write_exr(file, linear, text)
+        return file.read_bytes()
+
+
+def zipped(files: Iterable[tuple[str, bytes]]) -> bytes:
+    """An archive of files that are compressed already."""
+    body = io.BytesIO()
+    with zipfile.ZipFile(body, "w", zipfile.ZIP_STORED) as archive:
+        for name, data in files:
+            # A fixed date: the same pictures make the same archive.
+            archive.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), data)
+    return body.getvalue()
+
+
+def npy(array: NDArray[np.generic]) -> bytes:
+    """The array in numpy's own format."""
+    body = io.BytesIO()
+    np.save(body, array, allow_pickle=False)
+    return body.getvalue()
+
+
+def _webp(pixels: Pixels) -> bytes:
+    height, width, _ = pixels.shape
+    if max(width, height) > MOST_WEBP_SIDE:
+        raise UsageError(
+            f"image/webp: {width} x {height} pixels; it holds {MOST_WEBP_SIDE} a side, "
+            "ask for image/png"
+        )
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, "WEBP", lossless=True, quality=0, method=0)
+    return file.getvalue()

@@ -1,0 +1,385 @@
+"""A bounded queue before a few render processes, for an asyncio program."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import signal
+import time
+from collections import Counter
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+import lfd_render.errors
+from lfd_render.engine.jobs import Cancel, Done, Failed, Forget, Job, NotReady, Ready, Result, Work
+from lfd_render.engine.jobs import Progress as Told
+from lfd_render.engine.process import RenderProcess
+from lfd_render.engine.worker import WorkerConfig
+from lfd_render.errors import (
+    BusyError,
+    DeadlineError,
+    GpuError,
+    PoisonError,
+    UnavailableError,
+)
+
+_log = logging.getLogger(__name__)
+
+_WATCH_S = 0.1
+_MOST_DEATHS = 2  # of processes at a scene, before it is refused
+_MOST_KILLS = 4  # of processes at a job by others, before it is given up
+_PATIENCE_S = 1.0  # how long the first in the queue lets others go where their scene is warm
+_MOST_FAILED_STARTS = 3  # in a row, until which a new process is tried at once
+
+
+@dataclass(frozen=True)
+class PoolSettings:
+    """processes: how many render at once. queue: jobs that may wait. deadline_s: what a job may
+    take unless it says otherwise, waiting included. grace_s: how long a process may go on after
+    that before it is ended. worker: each process's own."""
+
+    processes: int = 1
+    queue: int = 32
+    deadline_s: float = 60.0
+    grace_s: float = 5.0
+    worker: WorkerConfig = field(default_factory=WorkerConfig)
+
+
+class InternalError(Exception):
+    """A job ended in an error that nobody expected; its trace is in the log."""
+
+
+@dataclass(eq=False)
+class _Ticket:
+    """A job on its way."""
+
+    number: int
+    job: Job
+    answer: asyncio.Future[Result]
+    deadline: float  # on the monotonic clock
+    submitted: float
+    started: float = 0.0
+    kills: int = 0
+    progress: Callable[[float], None] | None = None
+
+
+class Pool:
+    """Render processes, each with one context for life, and the jobs that wait for them.
+
+    A job goes to the process that has most of what it needs. It is done again when its process
+    dies; a scene at which processes die twice is refused from then on.
+    """
+
+    def __init__(self, settings: PoolSettings) -> None:
+        self.settings = settings
+        self.counts: Counter[str] = Counter()  # jobs by outcome, and restarts
+        self._busy: dict[RenderProcess, _Ticket | None] = {}
+        self._waiting: list[_Ticket] = []
+        self._deaths: Counter[str] = Counter()  # by scene
+        self._number = 0
+        self._failed_starts = 0
+        self._trouble = ""
+        self._draining = False
+        self._mean_s = 1.0  # of a job
+        self._watch: asyncio.Task[None] | None = None
+        self._changed = asyncio.Event()
+
+    async def start(self) -> None:
+        """Start the processes and wait until all are ready. Raises GpuError if one cannot be."""
+        for _ in range(self.settings.processes):
+            self._spawn()
+        self._watch = asyncio.create_task(self._watch_over(), name="watch")
+        while not all(process.renderer for process in self._busy):
+            if self._trouble:
+                await self.close()
+                raise GpuError(self._trouble)
+            await self._change()
+
+    async def run(
+        self,
+        job: Job,
+        *,
+        deadline_s: float | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Result:
+        """The job's result, with the milliseconds it waited as `queue` in its timings.
+
+        Cancelling the caller calls the job off. Raises BusyError when the queue is full,
+        DeadlineError, PoisonError, UnavailableError, InternalError, and the job's own errors.
+        """
+        self._check(job)
+        now = time.monotonic()
+        seconds = self.settings.deadline_s if deadline_s is None else deadline_s
+        self._number += 1
+        ticket = _Ticket(
+            self._number, job, asyncio.get_running_loop().create_future(), now + seconds, now,
+            progress=progress,
+        )  # fmt: skip
+        self._waiting.append(ticket)
+        self._dispatch()
+        try:
+            async with asyncio.timeout(seconds):
+                result = await ticket.answer
+        except TimeoutError:
+            self.counts["late"] += 1
+            raise DeadlineError(
+                f"took longer than {seconds:g} s; ask for fewer or smaller views, or again later"
+            ) from None
+        except asyncio.CancelledError:
+            self.counts["cancelled"] += 1
+            raise
+        except Exception:
+            self.counts["failed"] += 1
+            raise
+        finally:
+            self._leave(ticket)
+        self.counts["done"] += 1
+        result.timings_ms["queue"] = round(1000 * (ticket.started - ticket.submitted), 3)
+        return result
+
+    def forget(self, scene: str) -> None:
+        """Let all processes drop a scene."""
+        for process in self._busy:
+            process.send(Forget(scene))
+
+    async def drain(self, seconds: float) -> None:
+        """Take no more jobs, and wait so long for those that were taken."""
+        self._draining = True
+        with suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                while self._waiting or any(self._busy.values()):
+                    await self._change()
+
+    async def close(self) -> None:
+        """End the processes."""
+        self._draining = True
+        if self._watch:
+            self._watch.cancel()
+        processes = list(self._busy)
+        self._busy.clear()
+        for process in processes:
+            await asyncio.to_thread(process.close)
+        for ticket in self._waiting:
+            self._fail(ticket, UnavailableError("the server is going down; ask again"))
+
+    @property
+    def queued(self) -> int:
+        """Jobs that wait."""
+        return len(self._waiting)
+
+    @property
+    def running(self) -> int:
+        """Jobs that are being done."""
+        return sum(ticket is not None for ticket in self._busy.values())
+
+    @property
+    def ready(self) -> int:
+        """Processes that have their context."""
+        return sum(process.renderer is not None for process in self._busy)
+
+    @property
+    def renderers(self) -> list[str]:
+        """The GL renderers of the processes that are ready."""
+        return [process.renderer for process in self._busy if process.renderer]
+
+    @property
+    def pids(self) -> list[int]:
+        """The processes' numbers with the operating system."""
+        return [process.pid for process in self._busy]
+
+    @property
+    def resident_bytes(self) -> list[int]:
+        """What each process occupies."""
+        return [process.resident_bytes() for process in self._busy]
+
+    @property
+    def blocked(self) -> list[str]:
+        """Scenes that are refused."""
+        return [scene for scene, deaths in self._deaths.items() if deaths >= _MOST_DEATHS]
+
+    def _check(self, job: Job) -> None:
+        if self._draining:
+            raise UnavailableError("the server is going down; ask again")
+        if job.scene and self._deaths[job.scene.id] >= _MOST_DEATHS:
+            raise PoisonError(
+                f"{job.scene.name}: ended {_MOST_DEATHS} render processes and is refused; "
+                "give another scene"
+            )
+        if len(self._waiting) >= self.settings.queue:
+            self.counts["refused"] += 1
+            ahead = self._mean_s * (len(self._waiting) + 1) / self.settings.processes
+            wait_s = max(1, round(ahead))
+            raise BusyError(
+                f"{len(self._waiting)} pictures are waiting; ask again in {wait_s} s", wait_s
+            )
+
+    def _spawn(self) -> None:
+        self._busy[RenderProcess(self.settings.worker, self._heard, self._ended)] = None
+
+    def _dispatch(self) -> None:
+        """Give waiting jobs to idle processes."""
+        while self._waiting:
+            idle = [p for p, ticket in self._busy.items() if p.renderer and ticket is None]
+            if not idle:
+                return
+            process, ticket = self._match(idle)
+            self._waiting.remove(ticket)
+            ticket.started = time.monotonic()
+            self._busy[process] = ticket
+            process.send(Work(ticket.number, ticket.job))
+
+    def _match(self, idle: list[RenderProcess]) -> tuple[RenderProcess, _Ticket]:
+        """The job that goes next and the process it goes to: the first, unless one behind it finds
+        its scene warm and the first has not waited long."""
+        first = self._waiting[0]
+        patient = time.monotonic() - first.submitted < _PATIENCE_S
+        candidates = self._waiting if patient else [first]
+        # max takes the first of equals: the oldest job, and the process that idles.
+        return max(
+            ((process, ticket) for ticket in candidates for process in idle),
+            key=lambda pair: _warmth(pair[0], pair[1].job),
+        )
+
+    def _heard(self, process: RenderProcess, message: Any) -> None:
+        if process not in self._busy:
+            return
+        match message:
+            case Ready():
+                process.renderer, process.software = message.renderer, message.software
+                self._failed_starts = 0
+                self._dispatch()
+            case NotReady():
+                self._trouble = message.message
+            case Told():
+                ticket = self._busy[process]
+                if ticket and ticket.number == message.number and ticket.progress:
+                    ticket.progress(message.part)
+            case Done() | Failed():
+                self._answered(process, message)
+        self._changed.set()
+
+    def _answered(self, process: RenderProcess, message: Done | Failed) -> None:
+        ticket, self._busy[process] = self._busy[process], None
+        if message.holds:
+            process.holds = message.holds
+        if ticket is not None:
+            assert ticket.number == message.number
+            taken = time.monotonic() - ticket.started
+            self._mean_s += 0.1 * (taken - self._mean_s)
+            if isinstance(message, Failed):
+                self._fail(ticket, _error(message))
+            elif not ticket.answer.done():
+                ticket.answer.set_result(message.result)
+        self._dispatch()
+
+    def _ended(self, process: RenderProcess) -> None:
+        """A process has died: start another, and do its job again unless the job is to blame."""
+        if process not in self._busy:
+            return
+        ticket = self._busy.pop(process)
+        self.counts["restarts"] += 1
+        _log.warning(
+            "render process ended",
+            extra={"pid": process.pid, "returncode": process.returncode, "scene": _scene(ticket)},
+        )
+        if process.renderer is None:
+            self._failed_starts += 1
+            self._trouble = self._trouble or "a render process ended while it started"
+        if self._draining and not self._waiting and ticket is None:
+            return
+        if self._failed_starts < _MOST_FAILED_STARTS:
+            self._spawn()
+        else:
+            asyncio.get_running_loop().call_later(2.0**self._failed_starts / 4, self._spawn_later)
+        if ticket is not None:
+            self._mourn(process, ticket)
+        self._changed.set()
+
+    def _spawn_later(self) -> None:
+        if not self._draining and len(self._busy) < self.settings.processes:
+            self._spawn()
+
+    def _mourn(self, process: RenderProcess, ticket: _Ticket) -> None:
+        """Decide what becomes of a dead process's job."""
+        scene = ticket.job.scene
+        ticket.kills += 1
+        # SIGKILL that is not ours says nothing about the scene, until it happens again and again.
+        innocent = process.returncode == -signal.SIGKILL and not process.condemned
+        if scene and not innocent:
+            self._deaths[scene.id] += 1
+        if scene and (self._deaths[scene.id] >= _MOST_DEATHS or ticket.kills >= _MOST_KILLS):
+            self._deaths[scene.id] = max(self._deaths[scene.id], _MOST_DEATHS)
+            self._fail(
+                ticket,
+                PoisonError(f"{scene.name}: rendering it ends the process; give another scene"),
+            )
+        elif not ticket.answer.done():
+            self._waiting.insert(0, ticket)
+            self._dispatch()
+
+    def _fail(self, ticket: _Ticket, error: Exception) -> None:
+        if not ticket.answer.done():
+            ticket.answer.set_exception(error)
+
+    def _leave(self, ticket: _Ticket) -> None:
+        """Nobody waits for this ticket any more."""
+        if ticket in self._waiting:
+            self._waiting.remove(ticket)
+        for process, running in self._busy.items():
+            if running is ticket:
+                process.send(Cancel(ticket.number))
+        self._changed.set()
+
+    async def _watch_over(self) -> None:
+        """End processes that hang or grow too large."""
+        limit = self.settings.worker.memory_bytes
+        while True:
+            await asyncio.sleep(_WATCH_S)
+            now = time.monotonic()
+            for process, ticket in self._busy.items():
+                late = ticket and now > ticket.deadline + self.settings.grace_s
+                large = limit and process.resident_bytes() > limit
+                if (late or large) and not process.condemned:
+                    _log.warning(
+                        "render process is ended",
+                        extra={"pid": process.pid, "why": "hangs" if late else "too large"},
+                    )
+                    process.condemn()
+
+    async def _change(self) -> None:
+        """Wait until something has changed."""
+        self._changed.clear()
+        await self._changed.wait()
+
+
+def _warmth(process: RenderProcess, job: Job) -> int:
+    """How much of what a job needs a process has: 3 the finished panel image, 2 the stage, 1 the
+    parsed scene."""
+    holds = process.holds
+    if job.frame_key in holds.frames:
+        return 3
+    if job.stage_key == holds.stage:
+        return 2
+    return int(job.scene is not None and job.scene.id in holds.scenes)
+
+
+def _scene(ticket: _Ticket | None) -> str | None:
+    return ticket.job.scene.id if ticket and ticket.job.scene else None
+
+
+def _error(failed: Failed) -> Exception:
+    """The error that a process met."""
+    if failed.trace is not None:
+        _log.error("job failed", extra={"trace": failed.trace})
+        return InternalError(failed.arguments[0])
+    kind = getattr(lfd_render.errors, failed.kind)
+    error: Exception = kind(*failed.arguments)
+    return error
+
+
+def usable_cores() -> int:
+    """Cores that this program may use."""
+    return len(os.sched_getaffinity(0))
