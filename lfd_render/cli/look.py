@@ -10,7 +10,6 @@ import typer
 
 from lfd_render.cli import options
 from lfd_render.cli.console import Stopwatch, print_json, progress, say
-from lfd_render.panel.eyes import EYES_APART_MM, stands
 from lfd_render.cli.inputs import display_warnings, load_display, load_eia
 from lfd_render.cli.outputs import (
     STDOUT,
@@ -20,6 +19,8 @@ from lfd_render.cli.outputs import (
     remove_others,
     write_picture,
 )
+from lfd_render.panel.eyes import EYES_APART_MM, stands
+
 
 class Optics(StrEnum):
     """How a lens sends light."""

@@ -20,6 +20,7 @@ from lfd_render.cli.doctor import doctor
 from lfd_render.cli.look import look
 from lfd_render.cli.quilt import quilt
 from lfd_render.cli.render import render
+from lfd_render.cli.serve import serve
 from lfd_render.cli.unweave import unweave
 from lfd_render.cli.views import views
 from lfd_render.cli.weave import weave
@@ -28,6 +29,7 @@ from lfd_render.errors import (
     EXIT_INTERNAL,
     EXIT_INTERRUPTED,
     LfdError,
+    OptionError,
     ResourceError,
     UsageError,
     exit_code,
@@ -36,7 +38,7 @@ from lfd_render.errors import (
 app = typer.Typer(
     pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]}
 )
-for command in (render, views, quilt, weave, unweave, look, demo, doctor):
+for command in (render, views, quilt, weave, unweave, look, serve, demo, doctor):
     app.command()(command)
 app.add_typer(display)
 
@@ -95,6 +97,8 @@ def _end(number: int, _frame: object) -> None:
 
 def describe(error: BaseException) -> tuple[int, str]:
     """Exit code and one line of an error."""
+    if isinstance(error, OptionError):
+        return exit_code(error), f"--{error.option.replace('_', '-')}: {error.reason}"
     if isinstance(error, LfdError):
         return exit_code(error), str(error)
     if isinstance(error, KeyboardInterrupt):

@@ -112,9 +112,9 @@ class Camera:
         except ValidationError as cause:
             raise SceneError(one_line(cause, source)) from cause
         fields = file.model_dump()
-        turns = {f"{name}_rad": math.radians(fields.pop(f"{name}_deg")) for name in _TURNS}
+        fields |= {f"{turn}_rad": math.radians(fields.pop(f"{turn}_deg")) for turn in _TURNS}
         try:
-            return Camera(**fields, **turns)
+            return Camera(**fields)
         except SceneError as cause:
             raise SceneError(f"{source}: {cause}") from cause
 
@@ -175,9 +175,7 @@ class Camera:
     def turned(self, yaw_rad: float, pitch_rad: float = 0.0) -> Camera:
         """This camera with the scene turned further, its right-hand side and its upper side coming
         forward."""
-        return replace(
-            self, yaw_rad=self.yaw_rad + yaw_rad, pitch_rad=self.pitch_rad + pitch_rad
-        )
+        return replace(self, yaw_rad=self.yaw_rad + yaw_rad, pitch_rad=self.pitch_rad + pitch_rad)
 
     def with_depth_scale(self, factor: float) -> Camera:
         """This camera with depth about the window multiplied by a factor."""

@@ -186,6 +186,16 @@ class Pool:
         return [process.renderer for process in self._busy if process.renderer]
 
     @property
+    def software(self) -> bool:
+        """Whether any process renders without a graphics card."""
+        return any(process.software for process in self._busy)
+
+    @property
+    def accepting(self) -> bool:
+        """Whether a job would be taken and done."""
+        return not self._draining and self.ready > 0
+
+    @property
     def pids(self) -> list[int]:
         """The processes' numbers with the operating system."""
         return [process.pid for process in self._busy]

@@ -9,9 +9,7 @@ from lfd_render.errors import OptionError
 MAX_EXPOSURE_EV = 60
 
 
-def parse_size(
-    option: str, text: str | None, example: str = "480x360"
-) -> tuple[int, int] | None:
+def parse_size(option: str, text: str | None, example: str = "480x360") -> tuple[int, int] | None:
     """The two numbers of an option's ``480x360``; None stays None. Raises OptionError."""
     if text is None:
         return None

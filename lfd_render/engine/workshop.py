@@ -76,19 +76,20 @@ class Workshop:
         spans = Spans()
         match job.product:
             case PanelImage():
-                return self._panel_image(job, progress, spans)
+                result = self._panel_image(job, progress, spans)
             case Seen():
-                return self._seen(job, job.product, progress, spans)
+                result = self._seen(job, job.product, progress, spans)
             case OneView():
-                return self._one_view(job, job.product, progress, spans)
+                result = self._one_view(job, job.product, progress, spans)
             case AllViews():
-                return self._all_views(job, progress, spans)
+                result = self._all_views(job, progress, spans)
             case QuiltPicture():
-                return self._quilt(job, job.product, progress, spans)
+                result = self._quilt(job, job.product, progress, spans)
             case SceneFacts():
-                return self._facts(job, spans)
+                result = self._facts(job, spans)
             case ViewMap():
-                return _view_map(job, spans)
+                result = _view_map(job, spans)
+        return result
 
     def _scene(self, job: Job, spans: Spans) -> Scene:
         source = job.scene

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from lfd_render.errors import OptionError, UsageError
+from lfd_render.errors import OptionError
 
 if TYPE_CHECKING:
     from lfd_render.display import DisplayProfile
@@ -37,12 +37,12 @@ class Stand:
 def stands(
     profile: DisplayProfile, angle: float | None, eye: str | None, sweep: str | None
 ) -> list[Stand]:
-    """The places of exactly one of angle, eye and sweep. Raises UsageError."""
+    """The places of exactly one of angle, eye and sweep. Raises OptionError."""
     given = [name for name, value in (("angle", angle), ("eye", eye), ("sweep", sweep))
              if value is not None]  # fmt: skip
     if len(given) != 1:
         got = " and ".join(given) or "none of them"
-        raise UsageError(f"give one of angle, eye and sweep; got {got}")
+        raise OptionError("angle", f"give one of angle, eye and sweep; got {got}")
     if angle is not None:
         return [_at_angle(profile, angle, "angle")]
     if eye is not None:

@@ -52,7 +52,13 @@ BUILTINS: dict[str, Builtin] = {
 
 
 def load_builtin(source: str) -> Scene:
-    """Make the scene that `builtin:NAME?option=value&…` names.
+    """Make the scene that `builtin:NAME?option=value&…` names; raises SceneError."""
+    builtin, options = parse_builtin(source)
+    return builtin.make(**options)
+
+
+def parse_builtin(source: str) -> tuple[Builtin, dict[str, int]]:
+    """The maker that `builtin:NAME?option=value&…` names and what it is to be called with.
 
     Raises SceneError, listing the choices, on an unknown name or option or a value out of range.
     """
@@ -69,7 +75,7 @@ def load_builtin(source: str) -> Scene:
             raise SceneError(f"option: '{key}' is given twice; give it once")
         given.add(key)
         options[key] = _whole_number(key, text, *builtin.ranges[key])
-    return builtin.make(**options)
+    return builtin, options
 
 
 def _query_items(query: str) -> list[tuple[str, str]]:

@@ -130,8 +130,8 @@ def test_look_takes_eyes_pairs_and_sweeps(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "one of --angle, --eye and --sweep; got none"),
-        (("--angle", 1, "--eye", "0,0,1"), "got --angle and --eye"),
+        ((), "one of angle, eye and sweep; got none"),
+        (("--angle", 1, "--eye", "0,0,1"), "got angle and eye"),
         (("--angle", 90), "between -90 and 90"),
         (("--eye", "0,0"), "--eye: '0,0'; give X,Y,Z"),
         (("--eye", "0,0,-5"), "behind the panel"),

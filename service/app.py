@@ -1,0 +1,101 @@
+"""The application: ``uvicorn --factory lfd_render.service.app:create_app``."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+from starlette.middleware.cors import CORSMiddleware
+
+from lfd_render.engine.lru import ByteLru
+from lfd_render.engine.pool import Pool
+from lfd_render.version import __version__
+
+from . import displays, health, pictures, problems, scenes
+from .display_store import DisplayStore
+from .guards import Bodies, Keys, SameSite
+from .journal import Journal, log_json
+from .metrics import Metrics
+from .scene_store import SceneStore
+from .settings import Settings
+from .state import State
+
+_DESCRIPTION = """
+Panel images (EIA) of 3D scenes for tilted-lenticular light-field displays.
+
+Options are those of the `lfd-render` command, with underscores. `Accept` chooses the format; an
+unchanged picture is answered 304 by its `ETag`. Errors are `application/problem+json`.
+"""
+_EXPOSED = ["ETag", "Server-Timing", "Location", "Retry-After", "LFD-Size", "LFD-Warnings"]
+
+
+def create_app(settings: Settings | None = None) -> FastAPI:
+    """The application with these settings, by default the environment's. Raises UsageError."""
+    chosen = settings or Settings.from_environment()
+    log_json(chosen.log_level)
+    pool = Pool(chosen.pool)
+    metrics = Metrics(pool)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        with tempfile.TemporaryDirectory(prefix="lfd-render-") as temporary:
+            folder = Path(chosen.data_dir or temporary)
+            app.state.lfd = State(
+                chosen,
+                pool,
+                SceneStore(
+                    folder / "scenes", chosen.limits, chosen.max_scenes, chosen.upload_bytes
+                ),
+                DisplayStore(folder / "displays", chosen.max_displays),
+                ByteLru(chosen.answer_cache_mb << 20),
+                metrics,
+            )
+            await pool.start()
+            app.openapi()  # made once: it takes a third of a second, during which nobody is served
+            try:
+                yield
+            finally:
+                await pool.drain(chosen.drain_s)
+                await pool.close()
+
+    app = FastAPI(
+        title="lfd_render",
+        version=__version__,
+        description=_DESCRIPTION,
+        lifespan=lifespan,
+        redoc_url=None,
+    )
+    problems.install(app)
+    for part in (health, scenes, pictures, displays):
+        app.include_router(part.router)
+    # The last one added is the outermost.
+    app.add_middleware(Bodies, settings=chosen)
+    app.add_middleware(Keys, settings=chosen)
+    if chosen.cors_origins:
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=chosen.cors_origins,
+            allow_methods=["GET", "HEAD", "POST", "PUT", "DELETE"],
+            allow_headers=["Authorization", "X-API-Key", "Content-Type", "If-None-Match"],
+            expose_headers=_EXPOSED,
+        )
+    app.add_middleware(SameSite, settings=chosen)
+    app.add_middleware(Journal, metrics=metrics)
+    vars(app)["openapi"] = lambda: _openapi(app)  # as FastAPI would have it
+    return app
+
+
+def _openapi(app: FastAPI) -> dict[str, Any]:
+    """The description, with the schema that problems refer to."""
+    if not app.openapi_schema:
+        made = get_openapi(
+            title=app.title, version=app.version, description=app.description, routes=app.routes
+        )
+        made["components"]["schemas"]["Problem"] = problems.Problem.model_json_schema()
+        app.openapi_schema = made
+    return app.openapi_schema

@@ -1,0 +1,113 @@
+"""The outermost layer: request ids, a JSON line a request, metrics, errors nobody expected."""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+import sys
+import time
+import traceback
+import uuid
+from typing import Any
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from .answers import ClientGoneError
+from .metrics import Metrics
+from .problems import problem
+
+_log = logging.getLogger("lfd_render.service")
+_OURS = ("lfd_render", "uvicorn.error")
+_CLIENT_GONE = 499
+_PLAIN = set(vars(logging.makeLogRecord({}))) | {"message", "asctime", "color_message"}
+
+
+class JsonLines(logging.Formatter):
+    """A record as one JSON object."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Time, level, message and what else the record was given."""
+        told: dict[str, Any] = {
+            "time": round(record.created, 3),
+            "level": record.levelname.lower(),
+            "message": record.getMessage(),
+        }
+        told |= {k: v for k, v in vars(record).items() if k not in _PLAIN and v is not None}
+        if record.exc_info:
+            told["trace"] = self.formatException(record.exc_info)
+        return json.dumps(told, default=str)
+
+
+def log_json(level: str) -> None:
+    """Send this program's log lines to stderr as JSON."""
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(JsonLines())
+    for name in _OURS:
+        logger = logging.getLogger(name)
+        logger.handlers = [handler]
+        logger.setLevel(level.upper())
+        logger.propagate = False
+
+
+class Journal:
+    """Gives each request an id, its own where it is plain, and tells how it ended."""
+
+    def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
+        self._app = app
+        self._metrics = metrics
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """As ASGI has it."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        given = Headers(scope=scope).get("x-request-id", "")
+        known = re.fullmatch(r"[\w.-]{1,64}", given)
+        scope["request_id"] = given if known else uuid.uuid4().hex[:16]
+        started = time.perf_counter()
+        status, sent = 0, 0
+
+        async def noting(message: Message) -> None:
+            nonlocal status, sent
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                MutableHeaders(scope=message)["X-Request-Id"] = scope["request_id"]
+            sent += len(message.get("body", b""))
+            await send(message)
+
+        trace = None
+        try:
+            await self._app(scope, receive, noting)
+        except ClientGoneError:
+            status = _CLIENT_GONE
+        except Exception:
+            trace = traceback.format_exc()
+            if not status:
+                detail = "internal error; the server's log says more"
+                await problem(scope["request_id"], 500, detail)(scope, receive, noting)
+        seconds = time.perf_counter() - started
+        self._count(scope, status, seconds)
+        if trace or scope["path"] not in ("/livez", "/readyz", "/metrics"):
+            _log.log(
+                logging.ERROR if trace else logging.INFO,
+                "request",
+                extra={
+                    "request_id": scope["request_id"],
+                    "method": scope["method"],
+                    "path": scope["path"],
+                    "query": scope["query_string"].decode("latin-1"),
+                    "status": status,
+                    "ms": round(1000 * seconds, 3),
+                    "bytes": sent,
+                    "client": (scope.get("client") or [None])[0],
+                    "spans_ms": scope.get("lfd.spans"),
+                    "trace": trace,
+                },
+            )
+
+    def _count(self, scope: Scope, status: int, seconds: float) -> None:
+        route = getattr(scope.get("route"), "path", "none")
+        self._metrics.requests.labels(route, scope["method"], str(status)).inc()
+        self._metrics.seconds.labels(route).observe(seconds)

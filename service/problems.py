@@ -1,0 +1,134 @@
+"""Errors as ``application/problem+json`` (RFC 9457), whatever they are."""
+
+from __future__ import annotations
+
+import re
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
+from pydantic import BaseModel, Field
+from starlette.exceptions import HTTPException
+
+from lfd_render.engine.pool import InternalError
+from lfd_render.errors import BusyError, LfdError, OptionError, http_status
+
+MEDIA = "application/problem+json"
+_PICTURES = ("eia", "look", "views", "view", "quilt")
+_TYPE = re.compile(r"[^\w]|^(?:int|float|str|bool|none)$")
+
+
+class Problem(BaseModel):
+    """What went wrong, as RFC 9457 says it; `field` is the part of the request at fault."""
+
+    type: str = "about:blank"
+    title: str = Field(examples=["Unprocessable Content"])
+    status: int = Field(examples=[422])
+    detail: str = Field(examples=["views: Input should be less than or equal to 1024"])
+    field: str | None = Field(None, examples=["views"])
+    request_id: str | None = Field(None, examples=["5f0c9d1c3a7b4e22"])
+
+
+class ProblemError(HTTPException):
+    """A problem that a handler found."""
+
+    def __init__(
+        self,
+        status: int,
+        detail: str,
+        field: str | None = None,
+        headers: dict[str, str] | None = None,
+    ) -> None:
+        super().__init__(status, detail, headers)
+        self.field = field
+
+
+def problem(
+    request_id: str | None,
+    status: int,
+    detail: str,
+    field: str | None = None,
+    headers: dict[str, str] | None = None,
+) -> Response:
+    """The response that tells of a problem."""
+    told = Problem(
+        title=HTTPStatus(status).phrase, status=status, detail=detail, field=field,
+        request_id=request_id,
+    )  # fmt: skip
+    body = told.model_dump_json(exclude_none=True)
+    return Response(body, status, headers, MEDIA)
+
+
+def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """For OpenAPI: these statuses and those that every request may meet, as problems."""
+    always = (400, 401, 403, 404, 405, 413, 421, 422, 429, 500, 503)
+    schema = {"$ref": "#/components/schemas/Problem"}
+    return {
+        status: {
+            "description": HTTPStatus(status).phrase,
+            "content": {MEDIA: {"schema": schema}},
+        }
+        for status in sorted({*always, *statuses})
+    }
+
+
+def install(app: FastAPI) -> None:
+    """Answer every error of the application with a problem."""
+
+    def answer(
+        request: Request,
+        status: int,
+        detail: str,
+        field: str | None = None,
+        headers: dict[str, str] | None = None,
+    ) -> Response:
+        return problem(request.scope.get("request_id"), status, detail, field, headers)
+
+    @app.exception_handler(ProblemError)
+    async def own(request: Request, error: ProblemError) -> Response:
+        headers = dict(error.headers) if error.headers else None
+        return answer(request, error.status_code, error.detail, error.field, headers)
+
+    @app.exception_handler(LfdError)
+    async def lfd(request: Request, error: LfdError) -> Response:
+        headers = None
+        if isinstance(error, BusyError):
+            headers = {"Retry-After": str(error.retry_after_s)}
+        field = error.option if isinstance(error, OptionError) else _named(str(error))
+        status = http_status(error)
+        if status == HTTPStatus.SERVICE_UNAVAILABLE:
+            headers = {"Retry-After": "5"}
+        return answer(request, status, str(error), field, headers)
+
+    @app.exception_handler(RequestValidationError)
+    async def invalid(request: Request, error: RequestValidationError) -> Response:
+        first = error.errors()[0]
+        field = _place(first["loc"])
+        return answer(request, 422, f"{field}: {first['msg']}", field)
+
+    @app.exception_handler(HTTPException)
+    async def http(request: Request, error: HTTPException) -> Response:
+        headers = dict(error.headers) if error.headers else None
+        return answer(request, error.status_code, str(error.detail), None, headers)
+
+    @app.exception_handler(InternalError)
+    async def internal(request: Request, error: InternalError) -> Response:
+        return answer(request, 500, "internal error; the server's log says more")
+
+
+def _place(location: tuple[int | str, ...]) -> str:
+    """The field of a request that a validation names: without where it stands, which picture's
+    class it is of, and which of a field's types failed."""
+    where, *parts = map(str, location)
+    if where == "body" and len(parts) > 1 and parts[0] in _PICTURES:
+        del parts[0]
+    return ".".join(part for part in parts if not _TYPE.search(part)) or where
+
+
+def _named(detail: str) -> str | None:
+    """The field that a message of the renderer begins with, where it does."""
+    name, colon, _ = detail.partition(":")
+    words = name.split("'")[0].split()
+    known = colon and 1 <= len(words) <= 3 and all(word.isidentifier() for word in words)
+    return "_".join(words) if known else None

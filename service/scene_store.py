@@ -1,0 +1,246 @@
+"""Uploaded scenes on disk, under ids made of their content."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import time
+import uuid
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from lfd_render.engine.jobs import SceneSource
+from lfd_render.errors import SceneError
+from lfd_render.scene import LoadLimits
+from lfd_render.scene.builtin import PREFIX, parse_builtin
+
+from .problems import ProblemError
+
+SUFFIXES = (".glb", ".gltf", ".obj")
+_MOST_FILES = 512
+_MOST_PARTS = 8  # folders deep
+
+
+@dataclass(frozen=True)
+class StoredScene:
+    """An uploaded scene. main: the file that is the scene; facts: what a render process found."""
+
+    id: str
+    main: str
+    files: dict[str, int]  # bytes by relative name
+    created: float  # seconds since 1970
+    facts: dict[str, Any] = field(default_factory=dict)
+
+
+class Upload:
+    """A scene on its way in: files are written below a folder of its own."""
+
+    def __init__(self, folder: Path, most_bytes: int) -> None:
+        self.folder = folder
+        self._most_bytes = most_bytes
+        self._left = most_bytes
+        self._hashes: dict[str, str] = {}
+        self.files: dict[str, int] = {}
+
+    @contextmanager
+    def file(self, name: str) -> Iterator[_Sink]:
+        """Where a file's bytes go. Raises ProblemError for a name that leads elsewhere."""
+        confined(name)
+        if name in self.files:
+            raise ProblemError(422, f"files: '{name}' is there twice; give it once", "files")
+        if len(self.files) >= _MOST_FILES:
+            raise ProblemError(413, f"files: more than {_MOST_FILES}; give fewer", "files")
+        path = self.folder / name
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            stream = path.open("wb")
+        except (FileExistsError, NotADirectoryError, IsADirectoryError):
+            raise ProblemError(
+                422, f"files: '{name}' is a file and a folder; rename one", "files"
+            ) from None
+        with stream:
+            sink = _Sink(self, stream)
+            yield sink
+        self.files[name] = sink.bytes
+        self._hashes[name] = sink.digest.hexdigest()
+
+    def take(self, count: int) -> None:
+        """Count bytes against the limit. Raises ProblemError 413."""
+        self._left -= count
+        if self._left < 0:
+            raise too_large(self._most_bytes)
+
+    def main(self, asked: str | None) -> str:
+        """The file that is the scene: the one asked for, else the only one that can be."""
+        if asked is not None:
+            if asked not in self.files:
+                raise ProblemError(422, f"main: '{asked[:100]}' is none of the files", "main")
+            return asked
+        scenes = [name for name in self.files if name.lower().endswith(SUFFIXES)]
+        if len(scenes) != 1:
+            found = ", ".join(scenes) or "none"
+            raise ProblemError(
+                422,
+                f"files: {found[:200]} of them is a scene; give one {', '.join(SUFFIXES)}, or name "
+                "it in main",
+                "files",
+            )
+        return scenes[0]
+
+    def id(self, main: str) -> str:
+        """What names this content."""
+        told = json.dumps([main, sorted(self._hashes.items())])
+        return hashlib.sha256(told.encode()).hexdigest()[:40]
+
+
+class _Sink:
+    """A file being written, counted and hashed."""
+
+    def __init__(self, upload: Upload, stream: Any) -> None:
+        self._upload, self._stream = upload, stream
+        self.digest = hashlib.sha256()
+        self.bytes = 0
+
+    def write(self, data: bytes) -> None:
+        """Add bytes."""
+        self._upload.take(len(data))
+        self.digest.update(data)
+        self.bytes += len(data)
+        self._stream.write(data)
+
+
+def too_large(most_bytes: int) -> ProblemError:
+    """The problem of a body that is too large."""
+    return ProblemError(413, f"body: more than {most_bytes} bytes; give a smaller one", "body")
+
+
+def confined(name: str) -> None:
+    """Raise ProblemError unless a name is relative, plain and leads into no other folder."""
+    parts = PurePosixPath(name).parts
+    odd = any(not c.isprintable() or c in '\\:*?"<>|' for c in name)
+    if (
+        not parts
+        or odd
+        or name.startswith("/")
+        or any(part in (".", "..") or len(part.encode()) > 200 for part in name.split("/"))
+        or "" in name.split("/")
+        or len(parts) > _MOST_PARTS
+    ):
+        raise ProblemError(
+            422, f"files: '{name[:100]}'; give a relative name, as textures/wood.png", "files"
+        )
+
+
+class SceneStore:
+    """Scenes below a folder: ``<id>/scene.json`` tells of one, ``<id>/files/`` holds its files.
+
+    A scene that is deleted while pictures of it are made stays on disk until they are done.
+    """
+
+    def __init__(self, folder: Path, limits: LoadLimits, most_scenes: int, most_bytes: int) -> None:
+        self._folder = folder
+        self._limits = limits
+        self._most_scenes, self._most_bytes = most_scenes, most_bytes
+        self._leases: Counter[str] = Counter()
+        folder.mkdir(parents=True, exist_ok=True)
+        for left in folder.glob(".*"):  # of a server that was ended
+            shutil.rmtree(left, ignore_errors=True)
+        self._scenes = {scene.id: scene for scene in map(_read, folder.iterdir()) if scene}
+        self._gone: dict[str, Path] = {}  # deleted, still leased
+
+    def all(self) -> list[StoredScene]:
+        """All of them, the newest first."""
+        return sorted(self._scenes.values(), key=lambda scene: -scene.created)
+
+    def get(self, scene_id: str) -> StoredScene:
+        """The scene of an id. Raises ProblemError 404."""
+        try:
+            return self._scenes[scene_id]
+        except KeyError:
+            raise ProblemError(
+                404, f"scene '{scene_id[:100]}': unknown; upload it to /v1/scenes", "scene"
+            ) from None
+
+    @contextmanager
+    def source(self, scene_id: str) -> Iterator[SceneSource]:
+        """Where a scene is read from, which stays there meanwhile. Raises ProblemError 404."""
+        if scene_id.startswith(PREFIX):
+            yield _builtin(scene_id)
+            return
+        scene = self.get(scene_id)
+        self._leases[scene_id] += 1
+        try:
+            yield self._source(scene.id, self._folder / scene.id / "files" / scene.main)
+        finally:
+            self._leases[scene_id] -= 1
+            if not self._leases[scene_id]:
+                del self._leases[scene_id]
+                if scene_id in self._gone:
+                    shutil.rmtree(self._gone.pop(scene_id), ignore_errors=True)
+
+    def delete(self, scene_id: str) -> None:
+        """Forget a scene. Raises ProblemError 404."""
+        self.get(scene_id)
+        del self._scenes[scene_id]
+        folder = self._folder / scene_id
+        if self._leases[scene_id]:
+            self._gone[scene_id] = folder
+            (folder / "scene.json").unlink(missing_ok=True)
+        else:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    @contextmanager
+    def upload(self) -> Iterator[Upload]:
+        """A place for a new scene's files, removed unless it is added. Raises ProblemError."""
+        if len(self._scenes) >= self._most_scenes:
+            raise ProblemError(
+                507, f"there are {self._most_scenes} scenes; delete one first", "scenes"
+            )
+        folder = self._folder / f".{uuid.uuid4().hex}"
+        (folder / "files").mkdir(parents=True)
+        try:
+            yield Upload(folder / "files", self._most_bytes)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def candidate(self, upload: Upload, main: str) -> SceneSource:
+        """An upload as a scene to look into, before it is added."""
+        return self._source(upload.id(main), upload.folder / main)
+
+    def add(self, upload: Upload, main: str, facts: dict[str, Any]) -> tuple[StoredScene, bool]:
+        """Keep an upload; the scene, and whether it is new. Another may have come first."""
+        scene = StoredScene(upload.id(main), main, upload.files, time.time(), facts)
+        if scene.id in self._scenes:
+            return self._scenes[scene.id], False
+        (upload.folder.parent / "scene.json").write_text(json.dumps(asdict(scene)), "utf-8")
+        gone = self._gone.pop(scene.id, None)
+        if gone is None:
+            upload.folder.parent.rename(self._folder / scene.id)
+        else:  # it has come back before its last picture was done
+            (upload.folder.parent / "scene.json").rename(gone / "scene.json")
+        self._scenes[scene.id] = scene
+        return scene, True
+
+    def _source(self, scene_id: str, path: Path) -> SceneSource:
+        return SceneSource(scene_id, str(path), path.name, self._limits)
+
+
+def _builtin(scene_id: str) -> SceneSource:
+    try:
+        parse_builtin(scene_id)
+    except SceneError as error:
+        raise ProblemError(404, f"scene '{scene_id[:100]}': {error}", "scene") from None
+    return SceneSource(scene_id, scene_id, scene_id)
+
+
+def _read(folder: Path) -> StoredScene | None:
+    try:
+        data = json.loads((folder / "scene.json").read_text("utf-8"))
+        return StoredScene(**data)
+    except (OSError, ValueError, TypeError):
+        return None

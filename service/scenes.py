@@ -1,0 +1,195 @@
+"""Scenes: uploaded, listed, looked into, deleted."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from typing import Annotated
+
+from fastapi import APIRouter, Request, Response
+from fastapi import Path as PathParameter
+from fastapi.concurrency import run_in_threadpool
+from pydantic import BaseModel, Field
+from starlette.datastructures import UploadFile
+from starlette.formparsers import MultiPartException
+
+from lfd_render.engine import encoding
+from lfd_render.engine.jobs import Job, SceneFacts
+from lfd_render.scene.builtin import BUILTINS, PREFIX
+
+from .answers import racing
+from .problems import ProblemError, responses
+from .scene_store import StoredScene, Upload
+from .state import Shared, State
+
+router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
+
+_PIECE_BYTES = 1 << 20
+_SINGLE = {
+    "model/gltf-binary": "scene.glb",
+    "application/octet-stream": "scene.glb",
+    "model/gltf+json": "scene.gltf",
+    "model/obj": "scene.obj",
+}
+_MOST_PARTS = 512
+SceneId = Annotated[str, PathParameter(max_length=100, examples=["builtin:spheres"])]
+
+
+class SceneAnswer(BaseModel):
+    """A scene that the server has. created: seconds since 1970; None for built-in scenes, of which
+    the rest is known when they are rendered."""
+
+    id: str = Field(examples=["builtin:spheres"])
+    main: str = Field(description="The file that is the scene.")
+    created: float | None = None
+    files: dict[str, int] = Field(default_factory=dict, description="Bytes by name.")
+    triangles: int | None = None
+    meshes: int | None = None
+    materials: int | None = None
+    images: int | None = None
+    lights: int | None = None
+    cameras: list[str] = Field(default_factory=list, description="Names for `camera`.")
+    bounds: tuple[list[float], list[float]] | None = Field(
+        None, description="Lowest and highest corner of the scene's box."
+    )
+    bytes: int | None = Field(None, description="What it takes in memory.")
+    warnings: list[str] = Field(default_factory=list)
+
+
+class SceneList(BaseModel):
+    """All scenes, the newest first, then those built in."""
+
+    scenes: list[SceneAnswer]
+
+
+def _answer(scene: StoredScene) -> SceneAnswer:
+    known = {"id": scene.id, "main": scene.main, "created": scene.created, "files": scene.files}
+    return SceneAnswer.model_validate(known | scene.facts)
+
+
+@router.get("", summary="All scenes", responses=responses())
+async def list_scenes(state: Shared) -> SceneList:
+    """Those uploaded, the newest first, then those built in."""
+    names = [f"{PREFIX}{name}" for name in sorted(BUILTINS)]
+    own = [SceneAnswer.model_validate({"id": name, "main": name}) for name in names]
+    return SceneList(scenes=[*map(_answer, state.scenes.all()), *own])
+
+
+@router.post(
+    "",
+    summary="Upload a scene",
+    status_code=201,
+    response_model=SceneAnswer,
+    responses={
+        200: {"model": SceneAnswer, "description": "It was there already."},
+        **responses(408, 415, 504, 507),
+    },
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {
+                "model/gltf-binary": {"schema": {"type": "string", "format": "binary"}},
+                "multipart/form-data": {
+                    "schema": {
+                        "type": "object",
+                        "properties": {
+                            "files": {
+                                "type": "array",
+                                "items": {"type": "string", "format": "binary"},
+                                "description": "A .gltf, .glb or .obj and the files beside it, "
+                                "each under its place relative to the scene.",
+                            },
+                            "main": {
+                                "type": "string",
+                                "description": "Which file is the scene, where several could be.",
+                            },
+                        },
+                        "required": ["files"],
+                    }
+                },
+            },
+        }
+    },
+)
+async def upload_scene(request: Request, response: Response, state: Shared) -> SceneAnswer:
+    """A GLB as the body, or a .gltf or .obj with the files beside it as multipart/form-data.
+
+    Its id is made of its content: the same scene gets the same id.
+    """
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    with state.scenes.upload() as upload:
+        if kind == "multipart/form-data":
+            main = upload.main(await _take_form(request, upload))
+        elif kind in _SINGLE:
+            main = _SINGLE[kind]
+            await _take(request.stream(), upload, main)
+            if not upload.files[main]:
+                raise ProblemError(422, "body: is empty; send the scene's file", "body")
+        else:
+            raise ProblemError(
+                415, f"Content-Type: '{kind[:60]}'; send {', '.join(_SINGLE)} or "
+                "multipart/form-data", "Content-Type",
+            )  # fmt: skip
+        source = state.scenes.candidate(upload, main)
+        found = await racing(request, state, Job(SceneFacts(), encoding.JSON, source))
+        scene, new = state.scenes.add(upload, main, found.report)
+    response.status_code = 201 if new else 200
+    response.headers["Location"] = f"/v1/scenes/{scene.id}"
+    return _answer(scene)
+
+
+async def _take(pieces: AsyncIterator[bytes], upload: Upload, name: str) -> None:
+    with upload.file(name) as sink:
+        async for piece in pieces:
+            await run_in_threadpool(sink.write, piece)
+
+
+async def _take_form(request: Request, upload: Upload) -> str | None:
+    """Take the files of a form; the one that it says is the scene."""
+    try:
+        form = await request.form(max_files=_MOST_PARTS, max_fields=8, max_part_size=1 << 16)
+    except MultiPartException as error:
+        raise ProblemError(422, f"body: {error.message}", "body") from None
+    try:
+        main = None
+        for field, value in form.multi_items():
+            if isinstance(value, UploadFile):
+                await _take(_pieces(value), upload, value.filename or "")
+            elif field == "main":
+                main = value
+            else:
+                raise ProblemError(
+                    422, f"'{field[:60]}' is not known; give files, and main if need be", "body"
+                )
+        return main
+    finally:
+        await form.close()
+
+
+async def _pieces(file: UploadFile) -> AsyncIterator[bytes]:
+    while piece := await file.read(_PIECE_BYTES):
+        yield piece
+
+
+@router.get("/{scene}", summary="One scene", responses=responses(504))
+async def get_scene(request: Request, scene: SceneId, state: Shared) -> SceneAnswer:
+    """What a scene holds."""
+    if not scene.startswith(PREFIX):
+        return _answer(state.scenes.get(scene))
+    with state.scenes.source(scene) as source:
+        found = await racing(request, state, Job(SceneFacts(), encoding.JSON, source))
+    return SceneAnswer.model_validate({"id": scene, "main": scene} | found.report)
+
+
+@router.delete("/{scene}", summary="Delete a scene", status_code=204, responses=responses(409))
+async def delete_scene(scene: SceneId, state: Shared) -> Response:
+    """Forget a scene; pictures of it that are being made are finished."""
+    if scene.startswith(PREFIX):
+        raise ProblemError(409, f"scene '{scene[:100]}': is built in and stays", "scene")
+    delete(state, scene)
+    return Response(status_code=204)
+
+
+def delete(state: State, scene: str) -> None:
+    """Delete a scene from disk and from the render processes' memory."""
+    state.scenes.delete(scene)
+    state.pool.forget(scene)

@@ -1,0 +1,45 @@
+"""What the parts of a running service share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, cast
+
+from fastapi import Depends
+from starlette.requests import HTTPConnection
+
+from lfd_render.engine.lru import ByteLru
+from lfd_render.engine.pool import Pool
+
+from .display_store import DisplayStore
+from .metrics import Metrics
+from .scene_store import SceneStore
+from .settings import Settings
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An encoded picture with what its answer's header says."""
+
+    body: bytes
+    headers: dict[str, str]
+
+
+@dataclass(frozen=True)
+class State:
+    """Everything that handlers need."""
+
+    settings: Settings
+    pool: Pool
+    scenes: SceneStore
+    displays: DisplayStore
+    answers: ByteLru[Picture]
+    metrics: Metrics
+
+
+def state_of(connection: HTTPConnection) -> State:
+    """The state of the application that serves a request or a socket."""
+    return cast(State, connection.app.state.lfd)
+
+
+Shared = Annotated[State, Depends(state_of)]
