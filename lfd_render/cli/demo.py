@@ -7,24 +7,24 @@ from typing import Annotated
 import typer
 
 from lfd_render.cli import options
+from lfd_render.cli.bundle import LIGHT, with_choices
 from lfd_render.cli.console import progress, say
-from lfd_render.cli.inputs import load_display, load_light, load_scene, place_camera
+from lfd_render.cli.inputs import load_display, load_scene, warn_of_light
 from lfd_render.cli.outputs import check_folder_output, make_folder
+from lfd_render.engine.choices import Choices
 
 SCENE = "builtin:gallery?triangles=300000"
 # Where the eyes are, in cones from the middle.
 EYES = {"left": -0.375, "centre": 0.0, "right": 0.375}
 
 
+@with_choices(*LIGHT)
 def demo(
     output: Annotated[str, typer.Argument(metavar="FOLDER", help="Where the pictures go.")] = "out",
     *,
     scene: Annotated[str, typer.Option(help="Scene to show.")] = SCENE,
     display: options.DisplayOption = options.DEFAULT_DISPLAY,
-    environment: options.EnvironmentOption = "studio",
-    environment_turn: options.EnvironmentTurnOption = 0.0,
-    environment_intensity: options.EnvironmentIntensityOption = 1.0,
-    exposure: options.ExposureOption = None,
+    choices: Choices,
     device: options.DeviceOption = "auto",
 ) -> None:
     """Render a scene and look at it from the left, the centre and the right."""
@@ -33,21 +33,15 @@ def demo(
     profile = load_display(display)
     with progress("Loading"):
         loaded = load_scene(scene)
-        window = place_camera(loaded, profile)
-        light = load_light(
-            loaded,
-            environment=environment,
-            turn_deg=environment_turn,
-            intensity=environment_intensity,
-            exposure=exposure,
-        )
+        window = choices.window(loaded, profile)
+        warn_of_light(loaded, choices)
 
     from lfd_render.panel.look import look  # noqa: PLC0415 (keeps --help quick)
     from lfd_render.panel.picture import side_by_side, write_png  # noqa: PLC0415
     from lfd_render.renderer import Renderer  # noqa: PLC0415
 
     with progress("Rendering"), Renderer(device=device) as renderer:
-        eia = renderer.render(loaded, profile, window, **light)
+        eia = renderer.render(loaded, profile, window, **choices.options())
     with progress("Looking"):
         seen = {eye: look(eia.pixels, profile, at * profile.cone_rad) for eye, at in EYES.items()}
 

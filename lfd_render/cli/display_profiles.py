@@ -12,6 +12,7 @@ from lfd_render.cli import options
 from lfd_render.cli.console import print_json, print_text, say, warn
 from lfd_render.cli.inputs import load_display
 from lfd_render.cli.outputs import check_picture_output, write_picture
+from lfd_render.engine.texts import parse_views
 from lfd_render.errors import LfdError, OutputError, ProfileError, UsageError
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def show(
     json: options.JsonOption = False,
 ) -> None:
     """A display's figures, and what follows from them."""
-    count = options.parse_views(views)
+    count = parse_views(views)
     if count == "continuous":
         raise UsageError("--views: continuous; give a number")
     if picture is not None:

@@ -19,6 +19,7 @@ from lfd_render.cli.outputs import (
     remove_others,
     write_picture,
 )
+from lfd_render.engine.texts import parse_size
 from lfd_render.panel.eyes import EYES_APART_MM, stands
 
 
@@ -85,7 +86,7 @@ def look(
     json: options.JsonOption = False,
 ) -> None:
     """Show a panel image as an eye in front of the display sees it."""
-    size = options.parse_view_size(view_size)
+    size = parse_size("view_size", view_size)
     as_frames = sweep is not None and output != STDOUT and not Path(output).suffix
     if as_frames:
         folder = check_folder_output(output)

@@ -1,17 +1,15 @@
-"""Options that several commands share, and what their texts mean."""
+"""Options that several commands share."""
 
-import math
 import re
 from enum import StrEnum
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
-from lfd_render.errors import UsageError
+from lfd_render.errors import OptionError
 
 DEFAULT_DISPLAY = "gavane-2024-tilted-4k"
 MAX_SEED = 2**32 - 1
-MAX_EXPOSURE_EV = 60
 
 
 class Technique(StrEnum):
@@ -129,74 +127,11 @@ class Spacing(StrEnum):
     TANGENT = "tangent"
 
 
-def parse_view_size(text: str | None) -> tuple[int, int] | None:
-    """Columns and rows of ``480x360``; None stays None. Raises UsageError."""
-    return parse_size("--view-size", text)
-
-
-def parse_size(option: str, text: str | None, example: str = "480x360") -> tuple[int, int] | None:
-    """The two numbers of an option's ``480x360``; None stays None. Raises UsageError."""
-    if text is None:
-        return None
-    match = re.fullmatch(r"([1-9]\d{0,5})[x×]([1-9]\d{0,5})", text.strip().lower())
-    if not match:
-        raise UsageError(f"{option}: '{text}'; give columns x rows, as {example}")
-    return int(match[1]), int(match[2])
-
-
-def parse_views(text: str | None) -> int | Literal["continuous"] | None:
-    """A number of views, or ``continuous``; None stays None. Raises UsageError."""
-    if text is None:
-        return None
-    if text.strip().lower() == "continuous":
-        return "continuous"
-    if not re.fullmatch(r"[1-9]\d{0,5}", text.strip()):
-        raise UsageError(f"--views: '{text}'; give a whole number from 1, or continuous")
-    return int(text)
-
-
-def parse_supersample(text: str) -> tuple[int, int]:
-    """Pixels each way and eyes a view of ``none``, ``spatial``, ``angular`` or ``2x3``. Raises
-    UsageError."""
-    named = {"none": (1, 1), "spatial": (2, 1), "angular": (1, 2)}
-    chosen = text.strip().lower()
-    if chosen in named:
-        return named[chosen]
-    match = re.fullmatch(r"([1-9]\d?)[x×]([1-9]\d?)", chosen)
-    if not match:
-        raise UsageError(
-            f"--supersample: '{text}'; give none, spatial, angular, or pixels x eyes, as 2x3"
-        )
-    return int(match[1]), int(match[2])
-
-
-def parse_tiles(text: str | None) -> tuple[int, int] | None:
-    """Columns and rows of ``8x6``; None stays None. Raises UsageError."""
-    return parse_size("--tiles", text, "8x6")
-
-
 def check_device(text: str) -> str:
-    """The device as `Device.open` takes it. Raises UsageError."""
+    """The device as `Device.open` takes it. Raises OptionError."""
     if text not in ("auto", "gpu", "software") and not re.fullmatch(r"\d{1,3}", text):
-        raise UsageError(f"--device: '{text}'; give auto, gpu, software or an EGL index")
+        raise OptionError("device", f"'{text}'; give auto, gpu, software or an EGL index")
     return text
-
-
-def parse_exposure(text: str | None) -> float:
-    """The factor of ``0.5``, or of ``-1EV``: so many doublings. None is 1. Raises UsageError."""
-    if text is None:
-        return 1.0
-    number = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?"
-    match = re.fullmatch(rf"({number})(ev)?", text.strip().lower())
-    if match:
-        value = float(match[1])
-        stops = value if match[2] else math.log2(value) if 0 < value < math.inf else math.inf
-        if abs(stops) <= MAX_EXPOSURE_EV:
-            return 2.0**value if match[2] else value
-    raise UsageError(
-        f"--exposure: '{text}'; give a factor above 0, as 0.5, or stops, as -1.5EV, "
-        f"at most {MAX_EXPOSURE_EV} of them"
-    )
 
 
 SceneArgument = Annotated[
@@ -296,6 +231,12 @@ YawOption = Annotated[
     float,
     typer.Option(
         metavar="DEG", help="Turn the scene about the window's up axis, its right side forward."
+    ),
+]
+PitchOption = Annotated[
+    float,
+    typer.Option(
+        metavar="DEG", help="Then turn it about the window's horizontal axis, its top forward."
     ),
 ]
 DepthScaleOption = Annotated[float, typer.Option(metavar="F", help="Scale depth about the window.")]

@@ -11,6 +11,7 @@ from lfd_render.cli import options
 from lfd_render.cli.console import Stopwatch, print_json, progress, say, warn
 from lfd_render.cli.inputs import display_warnings, load_display
 from lfd_render.cli.outputs import check_picture_output, write_picture
+from lfd_render.engine.texts import parse_size
 from lfd_render.errors import UsageError
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def weave(
     json: options.JsonOption = False,
 ) -> None:
     """Weave a QUILT into the panel image (EIA) of a display."""
-    tiling = options.parse_tiles(tiles)
+    tiling = parse_size("tiles", tiles, "8x6")
     options.check_device(device)
     kind = check_picture_output(output, json, list(options.Format), format)
 

@@ -51,7 +51,7 @@ class Choices:
     environment: str | Environment = "studio"
     environment_turn: float = 0.0
     environment_intensity: float = 1.0
-    exposure: float = 1.0
+    exposure: float | None = None
 
     def __post_init__(self) -> None:
         """Check what RenderOptions does not; raises OptionError."""
@@ -68,12 +68,15 @@ class Choices:
         if distance is not None and not 0 < distance < math.inf:
             raise OptionError("focus_distance", f"{distance}; give a length above 0")
         if distance is not None and not isinstance(self.camera, str):
-            raise OptionError("focus_distance", "goes with --camera NAME, a camera of the scene")
+            raise OptionError("focus_distance", "goes with camera NAME, a camera of the scene")
 
     def options(self) -> dict[str, Any]:
         """Keywords of `Renderer.render` and `Renderer.views`, RenderOptions under their names."""
         chosen = {name: getattr(self, name) for name in _OPTIONS}
-        return chosen | {"environment_turn_rad": math.radians(self.environment_turn)}
+        return chosen | {
+            "environment_turn_rad": math.radians(self.environment_turn),
+            "exposure": 1.0 if self.exposure is None else self.exposure,
+        }
 
     def window(self, scene: Scene, profile: DisplayProfile) -> Camera:
         """Where the window stands: as chosen, else the scene's own window, else framed.

@@ -96,15 +96,14 @@ class Job:
     @cached_property
     def frame_key(self) -> str:
         """What the panel image depends on, and so whether a process has it already."""
-        choices = replace(self.choices, exposure=float(self.choices.exposure))
-        return _digest(self._scene_id, self._display, choices, self.media == EXR)
+        return _digest(self._scene_id, self._display, self.choices, self.media == EXR)
 
     @cached_property
     def stage_key(self) -> str:
         """What decides whether a process can go on with what it has on the device."""
         still = replace(
             self.choices, camera=None, focus_distance=None, yaw=0.0, pitch=0.0, depth_scale=1.0,
-            exposure=1.0,
+            exposure=None,
         )  # fmt: skip
         return _digest(self._scene_id, self._display, still)
 

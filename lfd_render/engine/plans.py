@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from lfd_render.engine.jobs import AllViews, Job, OneView, PanelImage, QuiltPicture, Seen
-from lfd_render.engine.quilts import quilt_size
+from lfd_render.engine.quilts import chosen_size
 from lfd_render.errors import ResourceError
 from lfd_render.panel.eyes import stands
 from lfd_render.renderer import RenderOptions, upright_size
@@ -22,7 +22,7 @@ def check_plan(job: Job, most_pixels: int) -> None:
             plan = plan_panel(job.display, choice)
             pixels = plan.rig.views * plan.rendered.columns * plan.rendered.rows
         case QuiltPicture(device, tiles, size):
-            quilt = quilt_size(job.display, device, tiles, size)
+            quilt = chosen_size(job.display, device, tiles, size)
             pixels = quilt.width_px * quilt.height_px * _samples(choice)
         case AllViews() | OneView():
             assert choice.views != "continuous"

@@ -8,7 +8,7 @@ from lfd_render.panel.quilt import MAX_TILES, PRESETS, QuiltSize
 from lfd_render.renderer import upright_size
 
 
-def quilt_size(
+def chosen_size(
     profile: DisplayProfile,
     device: str | None,
     tiles: tuple[int, int] | None,
@@ -17,7 +17,7 @@ def quilt_size(
     """Tiles and pixels as asked for, else as the display's own views ask. Raises OptionError."""
     if device is not None:
         if tiles or pixels:
-            raise OptionError("quilt", "names tiles and size; leave these out")
+            raise OptionError("quilt", "names tiles and size; leave tiles and size out")
         if device not in PRESETS:
             raise OptionError("quilt", f"'{device}' is not known; give {', '.join(PRESETS)}")
         return PRESETS[device]

@@ -45,10 +45,11 @@ def parse_supersample(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
-def parse_exposure(text: str | None) -> float:
-    """The factor of ``0.5``, or of ``-1EV``: so many doublings. None is 1. Raises OptionError."""
+def parse_exposure(text: str | None) -> float | None:
+    """The factor of ``0.5``, or of ``-1EV``: so many doublings; None stays None. Raises
+    OptionError."""
     if text is None:
-        return 1.0
+        return None
     number = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?"
     match = re.fullmatch(rf"({number})(ev)?", text.strip().lower())
     if match:

@@ -28,7 +28,7 @@ from lfd_render.engine.jobs import (
     ViewMap,
 )
 from lfd_render.engine.lru import ByteLru
-from lfd_render.engine.quilts import quilt_size
+from lfd_render.engine.quilts import chosen_size
 from lfd_render.errors import OptionError, UsageError
 from lfd_render.panel.eia import Eia
 from lfd_render.panel.eyes import stands
@@ -212,7 +212,7 @@ class Workshop:
 
     def _quilt(self, job: Job, asked: QuiltPicture, progress: Progress, spans: Spans) -> Result:
         display = _display(job)
-        size = quilt_size(display, asked.device, asked.tiles, asked.size)
+        size = chosen_size(display, asked.device, asked.tiles, asked.size)
         views = self._views(job, progress, spans, views=size.views, view_size=size.view_px)
         aspect = display.size_mm[0] / display.size_mm[1]
         pixels = (size.width_px, size.height_px)

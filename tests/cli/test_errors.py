@@ -94,7 +94,7 @@ def test_debug_shows_the_traceback(
             ("quilt", "x.glb", "-o", "a", "--quilt", "vision"),
             "'vision' is not known; give portrait",
         ),
-        (("quilt", "x.glb", "-o", "a", "--quilt", "go", "--tiles", "8x6"), "leave --tiles"),
+        (("quilt", "x.glb", "-o", "a", "--quilt", "go", "--tiles", "8x6"), "leave tiles"),
         (("quilt", "x.glb", "-o", "a", "--tiles", "40x40"), "40 x 40 are too many"),
         (
             ("quilt", "x.glb", "-o", "a", "--tiles", "8x6", "--size", "99x99"),

@@ -11,8 +11,8 @@ import OpenImageIO as oiio
 import pytest
 from numpy.typing import NDArray
 
-from lfd_render.cli.options import parse_exposure
 from lfd_render.display import Camera
+from lfd_render.engine.texts import parse_exposure
 from lfd_render.panel.picture import read_picture
 
 from .conftest import PANEL, Command, FakeRenderer
@@ -242,7 +242,7 @@ def test_focus_distance_needs_a_camera_of_the_scene(
 ) -> None:
     result = command("render", scene, "-o", tmp_path / "a.png", "--focus-distance", 3)
     assert result.code == 2
-    assert "--camera NAME" in result.error
+    assert "camera NAME" in result.error
 
 
 def test_dash_writes_the_picture_to_stdout(
