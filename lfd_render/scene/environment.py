@@ -59,7 +59,7 @@ class Environment:
         than reflections show are reduced, both with a warning. Raises PictureError, or
         ResourceError beyond the limits.
         """
-        pixels = _read(Path(path), limits or LoadLimits())
+        pixels = read_radiance(Path(path), limits or LoadLimits())
         warnings = []
         negative = (pixels < 0.0) & np.isfinite(pixels)
         if negative.any():
@@ -76,8 +76,9 @@ class Environment:
         return Environment(whole.name, pixels, tuple(warnings))
 
 
-def _read(path: Path, limits: LoadLimits) -> NDArray[np.float32]:
-    """Pixels [y, x, 3], linear."""
+def read_radiance(path: Path, limits: LoadLimits) -> NDArray[np.float32]:
+    """Pixels [y, x, 3], linear; whole numbers are taken as sRGB. Raises PictureError, or
+    ResourceError beyond the limits."""
     import OpenImageIO as oiio  # noqa: N813, PLC0415 (slow to import; its own documentation's name)
 
     if not path.is_file():  # opening a pipe waits for whoever may never write
