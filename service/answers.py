@@ -73,7 +73,7 @@ async def answer(request: Request, state: State, job: Job) -> Response:
     else:
         result = await racing(request, state, job)
         request.scope["lfd.spans"] = result.timings_ms
-        picture = Picture(result.body, _described(job, result))
+        picture = Picture(memoryview(result.body), _described(job, result))
         state.answers.put(job.key, picture, len(picture.body))
         headers["Server-Timing"] = server_timing(result.timings_ms)
     return PiecesResponse(picture.body, headers=headers | picture.headers, media_type=job.media)

@@ -24,5 +24,5 @@ class PiecesResponse(Response):
         body = memoryview(self.body)
         for start in range(0, max(len(body), 1), _PIECE_BYTES):
             end = start + _PIECE_BYTES
-            piece = bytes(body[start:end])
+            piece = body[start:end]
             await send({"type": "http.response.body", "body": piece, "more_body": end < len(body)})

@@ -21,7 +21,7 @@ from .settings import Settings
 class Picture:
     """An encoded picture with what its answer's header says."""
 
-    body: bytes
+    body: memoryview
     headers: dict[str, str]
 
 

@@ -131,13 +131,13 @@ def _digest(*parts: object) -> str:
 class Result:
     """The encoded picture; report: what `--json` of the command line prints."""
 
-    body: bytes
+    body: bytes | memoryview
     media: str
     report: dict[str, Any] = field(default_factory=dict)
     timings_ms: dict[str, float] = field(default_factory=dict)
 
 
-# To a process: number and job; CANCEL and number; FORGET and a scene's id. From it, the rest.
+# Messages to a process: Work, Cancel and Forget; from it: the rest.
 @dataclass(frozen=True)
 class Work:
     """A job under the number by which its answer is known."""
@@ -197,11 +197,12 @@ class Failed:
 
 @dataclass(frozen=True)
 class Done:
-    """A job's answer, without the body, which follows it as bare bytes."""
+    """A job's answer, without the body, whose so many bytes follow it."""
 
     number: int
     result: Result
     holds: Holds
+    body_bytes: int
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,10 @@ from dataclasses import replace
 from multiprocessing.connection import Connection
 from typing import Any
 
+from lfd_render.engine.bodies import receive_body
 from lfd_render.engine.jobs import Done, Holds
 from lfd_render.engine.worker import WorkerConfig
+from lfd_render.errors import LfdError
 
 _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 NOTHING = Holds(frozenset(), frozenset(), None)
@@ -97,10 +99,11 @@ class RenderProcess:
             while True:
                 message = self._pipe.recv()
                 if isinstance(message, Done):
-                    body = self._pipe.recv_bytes()
+                    body = receive_body(self._pipe, message.body_bytes)
                     message = replace(message, result=replace(message.result, body=body))
                 self._tell(self._on_message, self, message)
-        except (EOFError, OSError):
+        except (EOFError, OSError, LfdError):
+            self.kill()  # where it is not gone, what it says can no longer be followed
             self._popen.wait()
             self._pipe.close()
             self._tell(self._on_end, self)

@@ -19,6 +19,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from multiprocessing.connection import Connection
 
+from lfd_render.engine.bodies import send_body
 from lfd_render.engine.jobs import Cancel, Done, Failed, Forget, NotReady, Progress, Ready, Work
 from lfd_render.engine.workshop import Workshop
 from lfd_render.errors import CancelledError, LfdError, ResourceError, UsageError
@@ -89,8 +90,9 @@ class Worker:
         except Exception as error:
             self._pipe.send(self._failed(work, error))
         else:
-            self._pipe.send(Done(number, replace(result, body=b""), self._workshop.holds()))
-            self._pipe.send_bytes(result.body)
+            bare = replace(result, body=b"")
+            self._pipe.send(Done(number, bare, self._workshop.holds(), len(result.body)))
+            send_body(self._pipe, result.body)
         self._cancelled.discard(number)
 
     def _failed(self, work: Work, error: Exception) -> Failed:

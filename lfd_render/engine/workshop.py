@@ -114,6 +114,7 @@ class Workshop:
             choices.window(scene, display),
             progress=progress,
             linear=job.media == encoding.EXR,
+            counted=False,
             **choices.options(),
         )
         self._staged = job.stage_key

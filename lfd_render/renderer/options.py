@@ -48,6 +48,8 @@ class RenderOptions:
     lattice, point_source, density, texture_limit, culling, stochastic_culling, shade: the ideas of
     LFDPR, each as `Sampling` says; None: as the preset has them (`sampling`).
     effort: count what points try and keep in the last frame, which takes about a frame's time.
+    counted: count the last frame's points, which takes about as long as making them; without it the
+    report does not say when nothing can be seen.
     views: how many, or "continuous": each subpixel at its own angle, to 1/16 of a view interval.
     lookup, weave, aa: how views become the panel image, as `Reconstruction` has it; aa None: as the
     preset has it (`filter`). aa_light: whether filters average "linear" light or "encoded" pixels.
@@ -78,6 +80,7 @@ class RenderOptions:
     stochastic_culling: bool | None = None
     shade: str | None = None
     effort: bool = False
+    counted: bool = True
     lookup: str = "lens"
     weave: str = "nearest"
     aa: str | None = None
@@ -156,6 +159,7 @@ class RenderOptions:
             "texture_limit": (_is_flag, "True, False or None"),
             "stochastic_culling": (_is_flag, "True, False or None"),
             "effort": (_is_flag, "True or False"),
+            "counted": (_is_flag, "True or False"),
         }
         for name, (fits, remedy) in wanted.items():
             value = getattr(self, name)

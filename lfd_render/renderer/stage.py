@@ -189,7 +189,9 @@ class Stage:
 
 def _fixed(choice: RenderOptions) -> RenderOptions:
     """Options without those that each frame may choose."""
-    return replace(choice, repeat=1, exposure=1.0, background=(0.0, 0.0, 0.0), effort=False)
+    return replace(
+        choice, repeat=1, exposure=1.0, background=(0.0, 0.0, 0.0), effort=False, counted=True
+    )
 
 
 def _point_report(technique: Technique, choice: RenderOptions) -> dict[str, Any]:
@@ -199,7 +201,7 @@ def _point_report(technique: Technique, choice: RenderOptions) -> dict[str, Any]
     sampling = asdict(choice.sampling)
     report = {"point_source": sampling.pop("source"), **sampling, "splat": technique.winners}
     if not choice.effort:
-        return {"points": technique.count_points(), **report}
+        return {"points": technique.count_points() if choice.counted else None, **report}
     effort = technique.effort()
     per_pixel = effort.pairs_tried / max(effort.visible_pixels, 1)
     return {**asdict(effort), "pairs_per_visible_pixel": round(per_pixel, 3), **report}
