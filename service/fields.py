@@ -68,6 +68,9 @@ class Views(Placed):
     """How views are rendered."""
 
     technique: Literal["lfdpr", "mvr"] = Field("lfdpr", description="Rendering technique.")
+    mvr: Annotated[str, Field(max_length=60)] = Field(
+        "multipass", description="Variant of technique mvr.", examples=["loop-4-deferred"]
+    )
     preset: Literal["default", "paper", "gold"] = Field(
         "default", description="Choices of the technique: ours, the paper's, or slow and finest."
     )

@@ -25,6 +25,7 @@ _OPTIONS: dict[str, tuple[Any, Any]] = {
     "views": (options.ViewsOption, None),
     "view_size": (options.ViewSizeOption, None),
     "technique": (options.TechniqueOption, options.Technique.LFDPR),
+    "mvr": (options.MvrOption, "multipass"),
     "preset": (options.PresetOption, options.Preset.DEFAULT),
     "lookup": (options.LookupOption, options.Lookup.LENS),
     "weave": (options.WeavingOption, options.Weaving.NEAREST),

@@ -159,6 +159,14 @@ ViewSizeOption = Annotated[
     typer.Option(metavar="WxH", help="Columns and rows of a view; else the display's."),
 ]
 TechniqueOption = Annotated[Technique, typer.Option(help="Rendering technique.")]
+MvrOption = Annotated[
+    str,
+    typer.Option(
+        metavar="VARIANT",
+        help="Which multi-view rasterisation mvr is: multipass, instanced-4, loop-4, …, each also "
+        "with -deferred (docs/mvr.md).",
+    ),
+]
 PresetOption = Annotated[
     Preset,
     typer.Option(

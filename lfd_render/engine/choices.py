@@ -26,6 +26,7 @@ class Choices:
     views: int | Literal["continuous"] | None = None
     view_size: tuple[int, int] | None = None
     technique: str = "lfdpr"
+    mvr: str = "multipass"
     preset: str = "default"
     lookup: str = "lens"
     weave: str = "nearest"

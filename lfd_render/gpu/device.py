@@ -20,7 +20,10 @@ from lfd_render.gpu.memory import Ledger, Owned, texture_bytes
 from lfd_render.gpu.raw import (
     ERRORS,
     MAX_COMPUTE_SHADER_STORAGE_BLOCKS,
+    MAX_GEOMETRY_OUTPUT_VERTICES,
+    MAX_GEOMETRY_SHADER_INVOCATIONS,
     MAX_GEOMETRY_SHADER_STORAGE_BLOCKS,
+    MAX_GEOMETRY_TOTAL_OUTPUT_COMPONENTS,
     OUT_OF_MEMORY,
     RawGl,
 )
@@ -53,6 +56,9 @@ class DeviceInfo:
     max_groups: int
     max_storage_blocks: int  # of a compute shader
     geometry_storage: bool  # whether the geometry stage has storage blocks to speak of
+    max_geometry_vertices: int  # that an invocation of the geometry stage emits
+    max_geometry_components: int  # of all of them
+    max_geometry_invocations: int  # a triangle
     max_texture_bytes: int  # of one texture with its mip levels
     texture_budget_bytes: int  # of all textures of a scene
 
@@ -175,6 +181,9 @@ def _describe(context: moderngl.Context, raw: RawGl, egl_index: int) -> DeviceIn
         max_groups=int(info["GL_MAX_COMPUTE_WORK_GROUP_COUNT"][0]),
         max_storage_blocks=raw.integer(MAX_COMPUTE_SHADER_STORAGE_BLOCKS),
         geometry_storage=raw.integer(MAX_GEOMETRY_SHADER_STORAGE_BLOCKS) >= GEOMETRY_STORAGE_BLOCKS,
+        max_geometry_vertices=raw.integer(MAX_GEOMETRY_OUTPUT_VERTICES),
+        max_geometry_components=raw.integer(MAX_GEOMETRY_TOTAL_OUTPUT_COMPONENTS),
+        max_geometry_invocations=raw.integer(MAX_GEOMETRY_SHADER_INVOCATIONS),
         max_texture_bytes=max_texture_bytes,
         texture_budget_bytes=texture_budget_bytes,
     )

@@ -1,6 +1,6 @@
-"""Raster targets: layers of texture arrays with a depth buffer, and draws into them.
+"""Raster targets of one picture, raster state, and draws.
 
-moderngl attaches neither a layer of an immutable array nor layered depth, so this is raw OpenGL.
+moderngl attaches no layer of an immutable array, so this is raw OpenGL.
 """
 
 from __future__ import annotations
@@ -24,22 +24,11 @@ if TYPE_CHECKING:
 class LayerTarget(Owned):
     """A framebuffer over one layer at a time of a texture array."""
 
-    def __init__(self, device: Device, texture: TextureArray, *, depth: bool) -> None:
+    def __init__(self, device: Device, texture: TextureArray) -> None:
         super().__init__(device)
         self.texture = texture
-        self._depth = ctypes.c_uint()
         self._name = ctypes.c_uint()
-        raw = device.raw
-        raw.glCreateFramebuffers(1, ctypes.byref(self._name))
-        if depth:
-            raw.glCreateRenderbuffers(1, ctypes.byref(self._depth))
-            raw.glNamedRenderbufferStorage(
-                self._depth, gl.DEPTH_COMPONENT32F, texture.width, texture.height
-            )
-            raw.glNamedFramebufferRenderbuffer(
-                self._name, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, self._depth
-            )
-            device.ledger.add("depth", 4 * texture.width * texture.height)
+        device.raw.glCreateFramebuffers(1, ctypes.byref(self._name))
 
     def use(self, layer: int, rows: int | None = None) -> None:
         """Draw into this layer from now on: its first `rows`, all by default."""
@@ -49,15 +38,6 @@ class LayerTarget(Owned):
         )
         raw.glBindFramebuffer(gl.FRAMEBUFFER, self._name)
         raw.glViewport(0, 0, self.texture.width, rows or self.texture.height)
-
-    def clear(self, color: tuple[float, float, float, float]) -> None:
-        """Set the layer in use to a colour and its depth to farthest."""
-        value = (ctypes.c_float * 4)(*color)
-        self._device.raw.glClearNamedFramebufferfv(self._name, gl.COLOR, 0, value)
-        if self._depth.value:
-            self._device.raw.glClearNamedFramebufferfv(
-                self._name, gl.DEPTH, 0, ctypes.byref(ctypes.c_float(1.0))
-            )
 
     def read_rgb(self, gl_type: int, dtype: type[np.generic]) -> NDArray[np.generic]:
         """The layer in use as [y, x, 3], row 0 first. Waits for the device."""
@@ -70,11 +50,7 @@ class LayerTarget(Owned):
         return pixels
 
     def _free(self) -> None:
-        raw = self._device.raw
-        raw.glDeleteFramebuffers(1, ctypes.byref(self._name))
-        if self._depth.value:
-            raw.glDeleteRenderbuffers(1, ctypes.byref(self._depth))
-            self._device.ledger.add("depth", -4 * self.texture.width * self.texture.height)
+        self._device.raw.glDeleteFramebuffers(1, ctypes.byref(self._name))
 
 
 class EmptyTarget(Owned):
@@ -114,19 +90,19 @@ def conservative_raster(device: Device, wanted: bool) -> Iterator[None]:
 
 
 @contextmanager
-def rasterising(device: Device) -> Iterator[None]:
-    """Depth tests and clips at both sides of the window inside; off again whatever happens."""
+def rasterising(device: Device, clips: int) -> Iterator[None]:
+    """Depth tests, and so many clip distances, inside; off again whatever happens."""
     raw = device.raw
     raw.glEnable(gl.DEPTH_TEST)
     raw.glDepthFunc(gl.LESS)
-    raw.glEnable(gl.CLIP_DISTANCE0)
-    raw.glEnable(gl.CLIP_DISTANCE0 + 1)
+    for index in range(clips):
+        raw.glEnable(gl.CLIP_DISTANCE0 + index)
     raw.glCullFace(gl.BACK)
     try:
         yield
     finally:
-        raw.glDisable(gl.CLIP_DISTANCE0)
-        raw.glDisable(gl.CLIP_DISTANCE0 + 1)
+        for index in range(clips):
+            raw.glDisable(gl.CLIP_DISTANCE0 + index)
         raw.glDisable(gl.CULL_FACE)
         raw.glDisable(gl.DEPTH_TEST)
 
@@ -155,6 +131,16 @@ def blending_at_equal_depth(device: Device) -> Iterator[None]:
         raw.glDepthFunc(gl.LESS)
 
 
+@contextmanager
+def over_equal_depth(device: Device) -> Iterator[None]:
+    """Draws inside win over what is as far."""
+    device.raw.glDepthFunc(gl.LEQUAL)
+    try:
+        yield
+    finally:
+        device.raw.glDepthFunc(gl.LESS)
+
+
 def face_culling(device: Device, *, double_sided: bool, mirrored: bool) -> None:
     """Which side the next draws show. Row 0 at the raster's bottom turns windings over."""
     raw = device.raw
@@ -169,9 +155,11 @@ class IndexedDraws(Owned):
         super().__init__(device)
         self._vao = device.context.vertex_array(program.glo, [], index_buffer=indices.glo)
 
-    def draw(self, first: int, count: int) -> None:
-        """Draw `count` triangles from the `first` on."""
-        self._vao.render(self._device.triangles_mode, vertices=3 * count, first=3 * first)
+    def draw(self, first: int, count: int, instances: int = 1) -> None:
+        """Draw `count` triangles from the `first` on, so many times over."""
+        self._vao.render(
+            self._device.triangles_mode, vertices=3 * count, first=3 * first, instances=instances
+        )
 
     def _free(self) -> None:
         self._vao.release()

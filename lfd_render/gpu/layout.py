@@ -106,6 +106,15 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("uint", "triangle_base"),  # global id of the batch's first triangle
         ("uint", "seed"),
     ),
+    # A view of a hardware raster. Planes are in display space, positive on their inner side.
+    "RasterView": (
+        ("mat4", "clip_from_display"),
+        ("vec4", "left"),  # side planes of the window
+        ("vec4", "right"),
+        ("vec4", "part"),  # of the target's normalised coordinates: scale, offset
+        ("vec4", "box"),  # of the target's pixels: low, high corner
+        ("vec4", "eye"),  # in display space; w unused
+    ),
     # The rows of a triangle that can be seen, first | count << 16, and the length of its points.
     "Span": (
         ("uint", "rows"),

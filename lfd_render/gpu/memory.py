@@ -152,7 +152,15 @@ def _bytes(array: NDArray[Any]) -> NDArray[np.uint8]:
     return np.ascontiguousarray(array).reshape(-1).view(np.uint8)
 
 
-_BYTES_PER_TEXEL = {gl.RGBA8: 4, gl.SRGB8_ALPHA8: 4, gl.RGBA16F: 8, gl.RG32UI: 8, gl.RGBA32F: 16}
+_BYTES_PER_TEXEL = {
+    gl.RGBA8: 4,
+    gl.SRGB8_ALPHA8: 4,
+    gl.R32UI: 4,
+    gl.DEPTH_COMPONENT32F: 4,
+    gl.RGBA16F: 8,
+    gl.RG32UI: 8,
+    gl.RGBA32F: 16,
+}
 
 
 class TextureArray(Owned):
@@ -220,6 +228,16 @@ class TextureArray(Owned):
         self._device.raw.glCopyImageSubData(
             source.name, gl.TEXTURE_2D_ARRAY, level, 0, 0, 0,
             self.name, gl.TEXTURE_2D_ARRAY, 0, 0, top, layer, width, height, 1,
+        )  # fmt: skip
+
+    def copy_part(
+        self, source: TextureArray, layer: int, corner: tuple[int, int, int], size: tuple[int, int]
+    ) -> None:
+        """Set the first rows and columns of a layer from as many of a source from (x, y, layer)
+        on. size: columns, rows."""
+        self._device.raw.glCopyImageSubData(
+            source.name, gl.TEXTURE_2D_ARRAY, 0, *corner,
+            self.name, gl.TEXTURE_2D_ARRAY, 0, 0, 0, layer, *size, 1,
         )  # fmt: skip
 
     def generate_mipmaps(self) -> None:

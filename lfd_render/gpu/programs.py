@@ -81,6 +81,11 @@ class _Program(Owned):
                 uniform.value = value
         self._set_samplers(samplers or {})
 
+    def change(self, name: str, value: int | float) -> None:
+        """Set a uniform once more; what else was set stays. Unused ones may be given."""
+        if name in self._uniforms:
+            self._program[name].value = value
+
     def _set_samplers(self, samplers: Samplers) -> None:
         unit = 0
         for name, textures in samplers.items():

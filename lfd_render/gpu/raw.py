@@ -37,7 +37,6 @@ ONE_MINUS_SRC_ALPHA = 0x0303
 COLOR_ATTACHMENT0 = 0x8CE0
 DEPTH_ATTACHMENT = 0x8D00
 DEPTH_COMPONENT32F = 0x8CAC
-RENDERBUFFER = 0x8D41
 FRAMEBUFFER = 0x8D40
 READ_FRAMEBUFFER = 0x8CA8
 COLOR = 0x1800
@@ -54,10 +53,15 @@ CW = 0x0900
 CCW = 0x0901
 BACK = 0x0405
 LESS = 0x0201
+LEQUAL = 0x0203
 
 OUT_OF_MEMORY = 0x0505
 MAX_COMPUTE_SHADER_STORAGE_BLOCKS = 0x90DB
 MAX_GEOMETRY_SHADER_STORAGE_BLOCKS = 0x90D7
+MAX_GEOMETRY_OUTPUT_VERTICES = 0x8DE0
+MAX_GEOMETRY_TOTAL_OUTPUT_COMPONENTS = 0x8DE1
+MAX_GEOMETRY_SHADER_INVOCATIONS = 0x8E5A
+FRAMEBUFFER_COMPLETE = 0x8CD5
 FRAMEBUFFER_DEFAULT_WIDTH = 0x9310
 FRAMEBUFFER_DEFAULT_HEIGHT = 0x9311
 CONSERVATIVE_RASTERIZATION_NV = 0x9346
@@ -87,6 +91,8 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "glTextureSubImage3D": (None, (_u, _i, _i, _i, _i, _i, _i, _i, _u, _u, _p)),
     "glCopyImageSubData": (None, (_u, _u, _i, _i, _i, _i, _u, _u, _i, _i, _i, _i, _i, _i, _i)),
     "glTextureParameteri": (None, (_u, _u, _i)),
+    "glGenTextures": (None, (_i, _p)),
+    "glTextureView": (None, (_u, _u, _u, _u, _u, _u, _u, _u)),
     "glGenerateTextureMipmap": (None, (_u,)),
     "glClearNamedBufferData": (None, (_u, _u, _u, _u, _p)),
     "glClearTexImage": (None, (_u, _i, _u, _u, _p)),
@@ -96,12 +102,13 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "glCreateFramebuffers": (None, (_i, _p)),
     "glDeleteFramebuffers": (None, (_i, _p)),
     "glNamedFramebufferParameteri": (None, (_u, _u, _i)),
-    "glCreateRenderbuffers": (None, (_i, _p)),
-    "glDeleteRenderbuffers": (None, (_i, _p)),
-    "glNamedRenderbufferStorage": (None, (_u, _u, _i, _i)),
-    "glNamedFramebufferRenderbuffer": (None, (_u, _u, _u, _u)),
     "glNamedFramebufferTextureLayer": (None, (_u, _u, _u, _i, _i)),
+    "glNamedFramebufferTexture": (None, (_u, _u, _u, _i)),
+    "glNamedFramebufferDrawBuffers": (None, (_u, _i, _p)),
+    "glCheckNamedFramebufferStatus": (_u, (_u, _u)),
+    "glClearNamedFramebufferuiv": (None, (_u, _u, _i, _p)),
     "glBindFramebuffer": (None, (_u, _u)),
+    "glFramebufferTextureMultiviewOVR": (None, (_u, _u, _u, _i, _i, _i)),
     "glClearNamedFramebufferfv": (None, (_u, _u, _i, _p)),
     "glViewport": (None, (_i, _i, _i, _i)),
     "glScissor": (None, (_i, _i, _i, _i)),
@@ -115,6 +122,8 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "glColorMask": (None, (ctypes.c_ubyte,) * 4),
     "glBlendFunc": (None, (_u, _u)),
 }
+# Those of extensions, absent where the driver lacks them.
+_OPTIONAL = {"glFramebufferTextureMultiviewOVR"}
 
 
 class RawGl:
@@ -124,8 +133,9 @@ class RawGl:
         self._functions: dict[str, Any] = {}
         for name, (result, arguments) in _SIGNATURES.items():
             address = loader.load_opengl_function(name)
-            assert address, f"OpenGL has no {name}"
-            self._functions[name] = ctypes.CFUNCTYPE(result, *arguments)(address)
+            assert address or name in _OPTIONAL, f"OpenGL has no {name}"
+            if address:
+                self._functions[name] = ctypes.CFUNCTYPE(result, *arguments)(address)
 
     def __getattr__(self, name: str) -> Any:
         return self._functions[name]

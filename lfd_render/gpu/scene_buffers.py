@@ -49,6 +49,12 @@ class DrawRun:
     double_sided: bool
     mirrored: bool
 
+    @property
+    def facing(self) -> int:
+        """FACING_* bits."""
+        both = CONSTANTS["FACING_BOTH"] if self.double_sided else 0
+        return both | (CONSTANTS["FACING_MIRRORED"] if self.mirrored else 0)
+
 
 @dataclass
 class _Attributes:

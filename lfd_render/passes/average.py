@@ -21,7 +21,7 @@ class Average:
         size = (target.grid.columns // times, target.band_rows // times, target.rig.views // eyes)
         self.images = TextureArray(device, "averaged views", size, gl.RGBA16F)
         self.images.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
-        self._layer = LayerTarget(device, self.images, depth=False)
+        self._layer = LayerTarget(device, self.images)
 
     def __call__(self, band: Band) -> ViewImages:
         """Average a band."""

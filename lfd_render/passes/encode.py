@@ -21,7 +21,7 @@ class Encode:
         self._developed = developed
         self._pass = ScreenPass(device, "encode/srgb.frag" if developed else "encode/encode.frag")
         self._picture = TextureArray(device, "picture", (width, height, 1), gl.RGBA8)
-        self._framebuffer = LayerTarget(device, self._picture, depth=False)
+        self._framebuffer = LayerTarget(device, self._picture)
 
     def __call__(self, linear: TextureArray, layer: int, exposure: float = 1.0) -> None:
         """Encode one layer of a texture of the picture's size."""
@@ -57,7 +57,7 @@ class EncodeViews:
         self._pass = ScreenPass(device, "encode/encode.frag")
         self.images = TextureArray(device, "encoded views", size, gl.RGBA8)
         self.images.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
-        self._layer = LayerTarget(device, self.images, depth=False)
+        self._layer = LayerTarget(device, self.images)
 
     def __call__(self, linear: ViewImages, exposure: float) -> ViewImages:
         """Encode the rows of all views."""

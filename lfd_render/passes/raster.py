@@ -1,60 +1,77 @@
-"""Hardware rasterisation of one view: the baseline's pass, and the independent eye of the tests."""
+"""Hardware rasterisation of views by any pipeline of the catalogue."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import AbstractContextManager
 
-from lfd_render.display import Rig, ViewGrid
+from lfd_render.errors import GpuError
+from lfd_render.gpu import raw as gl
 from lfd_render.gpu.device import Device
-from lfd_render.gpu.framebuffer import (
-    IndexedDraws,
-    LayerTarget,
-    blending_at_equal_depth,
-    depth_only,
-    face_culling,
-    rasterising,
-)
+from lfd_render.gpu.framebuffer import IndexedDraws, face_culling, rasterising
 from lfd_render.gpu.layout import lod_constants
-from lfd_render.gpu.memory import Buffer
-from lfd_render.gpu.programs import RasterProgram, Samplers, Uniform
-from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
+from lfd_render.gpu.memory import Buffer, TextureArray
+from lfd_render.gpu.pass_target import Color, Layers, PassTarget
+from lfd_render.gpu.programs import RasterProgram, Uniform
+from lfd_render.gpu.scene_buffers import Batch, DrawRun, SceneBuffers
+from lfd_render.passes.pipelines import SHADED, Parts, Pipeline
 from lfd_render.passes.placement import Placement, gl_matrix
-from lfd_render.passes.view_target import Band, ViewTarget
+from lfd_render.passes.raster_views import band_views
+from lfd_render.passes.view_target import ViewTarget
 
-_Camera = dict[str, Uniform]
+_VERTEX = {
+    "multipass": "raster/each.vert",
+    "instanced": "raster/layered.vert",
+    "multiview": "raster/multiview.vert",
+}
+_GEOMETRY = {"loop": "raster/loop.geom", "invocations": "raster/invocations.geom"}
+SOLID = ("opaque", "mask")
+BLENDED = ("blend",)
+_PARTITION_CLIPS = 6
+_WINDOW_CLIPS = 2
 
 
-class RasterForward:
-    """SceneBuffers, one eye → one layer of ViewTarget.images: every fragment shaded as it comes.
+class Raster:
+    """SceneBuffers, views → one fragment shader's outputs, nearest triangles first, pass by pass.
 
-    Blended materials show their nearest layer, drawn where its depth is; coincident blended
-    triangles all blend there, where the other techniques keep one.
+    `colors` and `depth` are [layer, y, x], each view in its part (`parts`), row 0 on top.
     """
 
     def __init__(
-        self, device: Device, scene: SceneBuffers, target: ViewTarget, *, lod: str = "area"
+        self,
+        device: Device,
+        scene: SceneBuffers,
+        parts: Parts,
+        *,
+        pipeline: Pipeline,
+        fragment: str,
+        colors: Sequence[TextureArray],
+        constants: Mapping[str, int],
+        components: int = SHADED,
+        keep_depth: bool = False,
     ) -> None:
-        """lod: one of LOD_RULES, without the one that needs points."""
-        assert lod != "multiview"
+        """fragment: path of the shader. keep_depth: from each view to the next pass over it.
+
+        Raises GpuError where the device cannot draw so many views by the pipeline.
+        """
+        if problem := pipeline.problem(device, parts.views, components=components):
+            raise GpuError(f"mvr '{pipeline.name}': {problem}")
+        self.parts = parts
+        self.pipeline = pipeline
+        self.passes = pipeline.passes(parts.views)
+        self.colors = colors
         self._device = device
         self._scene = scene
-        self._target = target
-        self._layer = LayerTarget(device, target.images, depth=True)
+        width, height, layers = parts.size
+        longest = len(self.passes[0]) if pipeline.layered else 1
+        self.depth = TextureArray(
+            device, "depth", (width, height, layers if keep_depth else longest),
+            gl.DEPTH_COMPONENT32F,
+        )  # fmt: skip
+        self._targets = self._make_targets(keep_depth=keep_depth)
+        self._clips = _PARTITION_CLIPS if pipeline.clipping == "planes" else _WINDOW_CLIPS
         self._programs = {
-            alpha_mode: RasterProgram(
-                device,
-                "raster/forward.vert",
-                "raster/forward.frag",
-                {
-                    "ALPHA_TESTED": int(alpha_mode != "opaque"),
-                    "BLENDED": int(alpha_mode == "blend"),
-                    "MARGIN_COLUMNS": max(2, target.grid.fineness),
-                    **scene.constants(),
-                    **scene.lighting.constants(),
-                    **lod_constants(lod),
-                },
-            )
+            alpha_mode: self._program(fragment, alpha_mode, constants)
             for alpha_mode in sorted({batch.alpha_mode for batch in scene.batches})
         }
         self._indices: list[Buffer] = []
@@ -64,89 +81,179 @@ class RasterForward:
             program = self._programs[batch.alpha_mode]
             self._draws.append(IndexedDraws(device, program, self._indices[-1]))
 
-    def __call__(self, view: int, band: Band, placement: Placement) -> None:
-        """Render one view's rows of a band, row 0 of the layer on top."""
-        rig = self._target.rig
-        eye_mm = float(rig.eye_x_mm[view])
-        clip = band_clip_from_display(rig, self._target.grid, band, view)
-        camera: _Camera = {
-            "clip_from_display": gl_matrix(clip),
-            "turn_from_display": gl_matrix(placement.turn_from_display),
-            "eye_mm": eye_mm,
-        }
-        batches = list(zip(self._scene.batches, self._draws, strict=True))
-        blended = [pair for pair in batches if pair[0].alpha_mode == "blend"]
-        self._layer.use(view, band.rows)
-        self._layer.clear((*placement.background, 0.0))
-        with rasterising(self._device):
-            for batch, draws in batches:
-                if batch.alpha_mode != "blend":
-                    self._draw_batch(batch, draws, band, camera)
-            with depth_only(self._device):
-                for batch, draws in blended:
-                    self._draw_batch(batch, draws, band, camera)
-            with blending_at_equal_depth(self._device):
-                for batch, draws in blended:
-                    self._draw_batch(batch, draws, band, camera)
+    def _make_targets(self, *, keep_depth: bool) -> list[PassTarget]:
+        """A framebuffer for each pass; passes over parts of one layer share theirs."""
+        reached = "layered" if self.pipeline.layered else "layer"
+        if self.pipeline.amplification == "multiview":
+            reached = "multiview"
+        targets: dict[int, PassTarget] = {}
+        found = []
+        for views in self.passes:
+            first = self.parts.corner(views[0])[2]
+            count = len(views) if self.pipeline.layered else 1
+            if first not in targets:
+                targets[first] = PassTarget(
+                    self._device,
+                    [Layers(color, first, count) for color in self.colors],
+                    Layers(self.depth, first if keep_depth else 0, count),
+                    reached=reached,
+                )
+            found.append(targets[first])
+        return found
 
-    def _draw_batch(
-        self,
-        batch: Batch,
-        draws: IndexedDraws,
-        band: Band,
-        camera: _Camera,
+    def _program(
+        self, fragment: str, alpha_mode: str, constants: Mapping[str, int]
+    ) -> RasterProgram:
+        pipeline = self.pipeline
+        vertex = _VERTEX.get(pipeline.amplification, "raster/corners.vert")
+        if pipeline.partitioned and not pipeline.geometry:
+            vertex = _VERTEX["multipass"]
+        return RasterProgram(
+            self._device,
+            vertex,
+            fragment,
+            {
+                "ALPHA_TESTED": int(alpha_mode != "opaque"),
+                "BLENDED": int(alpha_mode == "blend"),
+                "VIEWS_A_PASS": len(self.passes[0]),
+                "CLIPS": self._clips,
+                "LAYERED": int(pipeline.layered),
+                "FRAGMENT_CLIPPING": int(pipeline.clipping == "fragments"),
+                "FRUSTUM_CULLING": int("frustum" in pipeline.culling),
+                "BACKFACE_CULLING": int("backface" in pipeline.culling),
+                **self._scene.constants(),
+                **constants,
+            },
+            geometry_path=_GEOMETRY.get(pipeline.amplification),
+        )
+
+    def clear(self, step: int, color: Color | int, *, depth: bool = True) -> None:
+        """Empty the target of a pass, unless an earlier pass shares it."""
+        if step == 0 or self._targets[step] is not self._targets[step - 1]:
+            self._targets[step].clear(color, depth=depth)
+
+    def draw(
+        self, step: int, modes: Collection[str], views: Buffer, rows: int, placement: Placement
     ) -> None:
-        """Draw a batch's runs: sides culled as each run's materials and placements ask."""
-        buffers = {
-            "DisplayPositions": batch.display_positions,
-            "LocalPositions": batch.local_positions,
-            "Draws": self._scene.draws,
-            **batch.attributes(),
-            "WorldNormals": batch.world_normals,
-            "FrameBlock": band.frame(batch),
-            **self._scene.materials_of(),
-            **self._scene.lighting.buffers(),
+        """Draw the batches of some alpha modes in one pass. views: RasterViews; rows: of the views
+        that are drawn."""
+        seen = self.passes[step]
+        width, height, _ = self.parts.size
+        if self.pipeline.clipping == "viewport":
+            x, y, _ = self.parts.corner(seen[0])
+            self._targets[step].use(x, y, self.parts.columns, rows)
+        else:
+            self._targets[step].use(0, 0, width, height if self.pipeline.partitioned else rows)
+        instances = len(seen) if self.pipeline.amplification == "instanced" else 1
+        for batch, draws in zip(self._scene.batches, self._draws, strict=True):
+            if batch.alpha_mode in modes:
+                program = self._programs[batch.alpha_mode]
+                self._set(program, batch, views, seen, placement)
+                for run in self._scene.runs(batch):
+                    self._set_run(program, batch, run)
+                    draws.draw(run.first, run.count, instances)
+
+    def _set(
+        self,
+        program: RasterProgram,
+        batch: Batch,
+        views: Buffer,
+        seen: range,
+        placement: Placement,
+    ) -> None:
+        lighting = self._scene.lighting
+        uniforms: dict[str, Uniform] = {
+            "first_view": seen[0],
+            "first_triangle": 0,
+            "turn_from_display": gl_matrix(placement.turn_from_display),
         }
-        samplers: Samplers = {**self._scene.samplers(), **self._scene.lighting.samplers()}
-        self._programs[batch.alpha_mode].set(buffers, camera, samplers)
-        for run in self._scene.runs(batch):
-            face_culling(self._device, double_sided=run.double_sided, mirrored=run.mirrored)
-            draws.draw(run.first, run.count)
+        if self.pipeline.geometry:
+            uniforms |= {"views": len(seen), "facing": 0}
+        program.set(
+            {
+                "DisplayPositions": batch.display_positions,
+                "LocalPositions": batch.local_positions,
+                "Draws": self._scene.draws,
+                **batch.attributes(),
+                "WorldNormals": batch.world_normals,
+                "RasterViews": views,
+                **self._scene.materials_of(),
+                **lighting.buffers(),
+            },
+            uniforms,
+            {**self._scene.samplers(), **lighting.samplers()},
+        )
+
+    def _set_run(self, program: RasterProgram, batch: Batch, run: DrawRun) -> None:
+        """Name a run's triangles, and cull the sides that its materials and placements hide."""
+        face_culling(self._device, double_sided=run.double_sided, mirrored=run.mirrored)
+        program.change("first_triangle", batch.triangle_base + run.first)
+        program.change("facing", run.facing)
+
+    def rasterising(self) -> AbstractContextManager[None]:
+        """The state that draws need."""
+        return rasterising(self._device, self._clips)
+
+    def release(self) -> None:
+        """Free everything but the colours."""
+        for owner in (*self._draws, *self._indices, *self._programs.values()):
+            owner.release()
+        for target in dict.fromkeys(self._targets):
+            target.release()
+        self.depth.release()
+
+
+class BandRaster:
+    """A raster of the views of a ViewTarget, band by band."""
+
+    def __init__(
+        self,
+        device: Device,
+        scene: SceneBuffers,
+        target: ViewTarget,
+        *,
+        lod: str,
+        pipeline: Pipeline,
+        fragment: str,
+        formats: Sequence[int],
+        components: int = SHADED,
+        keep_depth: bool = False,
+        into_images: bool = False,
+    ) -> None:
+        """formats: of the colours, in textures of their own; into_images: instead in the target's
+        images, where views are layers."""
+        assert lod != "multiview"  # which needs points
+        self._device = device
+        self._target = target
+        self.parts = Parts.of(pipeline, target.rig.views, target.grid.columns, target.band_rows)
+        self._own = [
+            TextureArray(device, "raster", self.parts.size, internal_format)
+            for internal_format in formats
+            if pipeline.partitioned or not into_images
+        ]
+        for texture in self._own:
+            texture.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
+        self.raster = Raster(
+            device,
+            scene,
+            self.parts,
+            pipeline=pipeline,
+            fragment=fragment,
+            colors=self._own or [target.images],
+            constants={**scene.lighting.constants(), **lod_constants(lod)},
+            components=components,
+            keep_depth=keep_depth,
+        )
+        self.steps = range(len(self.raster.passes))
+        self.views = {
+            band: Buffer.of(device, "rig", band_views(target, band, pipeline, self.parts))
+            for band in (*target.bands, target.warm_up_band)
+        }
 
     def release(self) -> None:
         """Free everything but the target."""
-        for draws in self._draws:
-            draws.release()
-        for buffer in self._indices:
-            buffer.release()
-        for program in self._programs.values():
-            program.release()
-        self._layer.release()
-
-
-def band_clip_from_display(rig: Rig, grid: ViewGrid, band: Band, view: int) -> NDArray[np.float64]:
-    """clip_from_display, float64 [4, 4], of one view's band: column c of row r has its centre at
-    the raster's (c + ½, r − band.first + ½), row 0 at the bottom.
-
-    column·d = D·X/column_mm + (d − D)·eye + offset·d, with an offset linear in the row (`upright`
-    or `sheared` grids), and row·d = (h/2·d − D·Y)/row_mm; d = D − Z; depth d − 2·near.
-    """
-    distance = rig.distance_mm
-    height = rig.panel_mm[1]
-    eye = rig.eye_x_mm[view] / grid.column_mm
-    row_mm = height / grid.rows
-    slope = float(grid.row_offset[1] - grid.row_offset[0]) if grid.rows > 1 else 0.0
-    start = float(grid.row_offset[0]) - 0.5 * slope
-    assert np.allclose(grid.row_offset, start + slope * (np.arange(grid.rows) + 0.5), atol=1e-6)
-
-    depth = np.array([0.0, 0.0, -1.0, distance])
-    row = 0.5 * height / row_mm * depth + np.array([0.0, -distance / row_mm, 0.0, 0.0])
-    column = np.array([distance / grid.column_mm, 0.0, -eye, 0.0]) + start * depth + slope * row
-    return np.stack(
-        [
-            2.0 / grid.columns * column - depth,
-            2.0 / band.rows * (row - band.first * depth) - depth,
-            depth + np.array([0.0, 0.0, 0.0, -2.0 * rig.near_mm]),
-            depth,
-        ]
-    )
+        self.raster.release()
+        for texture in self._own:
+            texture.release()
+        for views in self.views.values():
+            views.release()

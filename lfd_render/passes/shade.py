@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -13,11 +14,32 @@ from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.items import GROUPS_ACROSS
 from lfd_render.passes.placement import Placement, gl_matrix
-from lfd_render.passes.sampling import DEFAULT_SAMPLING, Points, Sampling
-from lfd_render.passes.view_buffers import ViewBuffers
+from lfd_render.passes.sampling import DEFAULT_SAMPLING, Sampling
+from lfd_render.passes.view_buffers import Winners
 from lfd_render.passes.view_target import Band, ViewTarget
 
-Sampled = tuple[Batch, Points]
+
+class Sized(Protocol):
+    """What shading reads of a batch's points."""
+
+    @property
+    def sizes(self) -> Buffer:
+        """As `Points.sizes`."""
+        ...
+
+
+class NoPoints:
+    """What stands for points where triangles were rasterised: no rule that reads sizes is used."""
+
+    def __init__(self, device: Device) -> None:
+        self.sizes = Buffer(device, "no points", 8)
+
+    def release(self) -> None:
+        """Free the buffer."""
+        self.sizes.release()
+
+
+Sampled = tuple[Batch, Sized]
 
 BLOCK = 16  # columns of a view shaded together
 GROUP_BLOCKS = 4  # blocks of a work group
@@ -25,7 +47,7 @@ _LIST_GROUP = 64  # local_size_x of shade/blocks.comp
 
 
 class Shade:
-    """ViewBuffers, ViewTarget → ViewTarget.images: each visible pixel is shaded once, where its ray
+    """Winners, ViewTarget → ViewTarget.images: each visible pixel is shaded once, where its ray
     meets the triangle that its word names. `blend` lays the nearest blended surface over it."""
 
     def __init__(
@@ -61,7 +83,7 @@ class Shade:
         self._no_work["groups_z"] = 1
 
     def opaque(
-        self, batches: Sequence[Sampled], band: Band, views: ViewBuffers, placement: Placement
+        self, batches: Sequence[Sampled], band: Band, views: Winners, placement: Placement
     ) -> None:
         """Shade a band over the background. batches: each with the points it was sampled by."""
         images = band.target.images
@@ -70,7 +92,7 @@ class Shade:
         self._run(self._opaque, batches, band, views, placement)
 
     def blend(
-        self, batches: Sequence[Sampled], band: Band, views: ViewBuffers, placement: Placement
+        self, batches: Sequence[Sampled], band: Band, views: Winners, placement: Placement
     ) -> None:
         """Lay the blended surfaces that `views` now names over the band's images."""
         band.target.images.bind_image(0, writeonly=False)
@@ -81,7 +103,7 @@ class Shade:
         kernel: Kernel,
         batches: Sequence[Sampled],
         band: Band,
-        views: ViewBuffers,
+        views: Winners,
         placement: Placement,
     ) -> None:
         turn_from_display = gl_matrix(placement.turn_from_display)

@@ -42,11 +42,15 @@ def choose_winners(device: Device, wanted: str, *, ownable: bool = True) -> str:
     return "owned" if device.info.software and ownable else "two-pass"
 
 
-class ViewBuffers(Protocol):
-    """Winners: global triangle ids or NO_TRIANGLE, each `word_stride` words of `words` apart."""
+class Winners(Protocol):
+    """Global triangle ids or NO_TRIANGLE, each `word_stride` words of `words` apart."""
 
     words: Buffer
     word_stride: int
+
+
+class ViewBuffers(Winners, Protocol):
+    """Winners, and how near they are."""
 
     def blocks(self) -> dict[str, Buffer]:
         """What splatting writes, by block name."""

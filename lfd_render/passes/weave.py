@@ -51,7 +51,7 @@ class Weave:
         width, height = profile.resolution_px
         form = gl.RGBA8 if encoded else gl.RGBA16F
         self.panel = TextureArray(device, "panel image", (width, height, 1), form)
-        self.framebuffer = LayerTarget(device, self.panel, depth=False)
+        self.framebuffer = LayerTarget(device, self.panel)
         self._step: _Step = kind(device, profile, grid, views, rule)
         if isinstance(self._step, _Nearest):
             self._step.choose(self.panel, self.framebuffer)
@@ -149,7 +149,7 @@ class _Nearest:
         phases = _Phases(device, profile, grid, views)
         self._places = TextureArray(device, "weave", (width, height, 1), gl.RG32UI)
         self._places.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
-        target = LayerTarget(device, self._places, depth=False)
+        target = LayerTarget(device, self._places)
         make_map = ScreenPass(device, "weave/places.frag", phases.constants)
         target.use(0)
         make_map({}, phases.uniforms, phases.textures, (0, height), width)

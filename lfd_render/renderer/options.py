@@ -24,6 +24,7 @@ from lfd_render.passes.sampling import (
 )
 from lfd_render.passes.view_buffers import WINNERS
 from lfd_render.scene import Environment
+from lfd_render.techniques.mvr import DEFAULT_VARIANT, pipeline_of
 
 TECHNIQUES = ("lfdpr", "mvr")
 PRESETS = ("default", "paper", "gold")
@@ -38,7 +39,8 @@ MOST_RADIANCE = 65504.0  # what half floats hold
 @dataclass(frozen=True)
 class RenderOptions:
     """How to render. view_size: upright views of (width, height); None: views that follow the
-    lenses, with as many rows as makes all views together as large as the panel. projection: how
+    lenses, with as many rows as makes all views together as large as the panel. mvr: which variant
+    of technique mvr, one of `techniques.mvr.VARIANTS`. projection: how
     points reach the views, by the shear that parallel views share or by each view's own matrix.
     splat: how a pixel's nearest point is found, by 64-bit atomics, by two passes of 32-bit ones or
     by work groups that own their pixels, with the same picture; auto: what suits the device.
@@ -60,6 +62,7 @@ class RenderOptions:
     views: int | Literal["continuous"] | None = None
     view_size: tuple[int, int] | None = None
     technique: str = "lfdpr"
+    mvr: str = DEFAULT_VARIANT
     preset: str = "default"
     spacing: Spacing | None = None
     seed: int = 0
@@ -107,6 +110,12 @@ class RenderOptions:
         if self.lod == "multiview" and self.technique == "mvr":
             others = " or ".join(rule for rule in LOD_RULES if rule != "multiview")
             raise UsageError(f"lod 'multiview': mvr has no points that views share; use {others}")
+        pipeline_of(self.mvr)  # which checks it
+        if self.mvr != DEFAULT_VARIANT and self.technique != "mvr":
+            raise UsageError(
+                f"mvr '{self.mvr}': technique '{self.technique}' rasterises no views; "
+                "use it with technique mvr"
+            )
         self._check_sampling()
         self._check_splat()
         self._check_views()

@@ -32,7 +32,7 @@ from lfd_render.renderer.options import RenderOptions, choose
 from lfd_render.renderer.plan import ViewPlan, plan_panel, plan_views, upright_size
 from lfd_render.renderer.stage import REPEAT_TURN_RAD, Stage, check_frame, check_in_front
 from lfd_render.scene import Environment, Pose, Scene
-from lfd_render.techniques import Lfdpr, Mvr, Technique
+from lfd_render.techniques import Lfdpr, Technique, make_mvr
 
 MOST_EYES = 2048
 MOST_VIEW_PIXELS = 1 << 32  # of all views together: hours on a processor, and far above any panel
@@ -392,7 +392,7 @@ class Renderer:
             halo=plan.halo,
         )
         if choice.technique == "mvr":
-            return Mvr(self.device, buffers, target, lod=choice.lod_rule)
+            return make_mvr(self.device, buffers, target, variant=choice.mvr, lod=choice.lod_rule)
         return Lfdpr(
             self.device,
             buffers,

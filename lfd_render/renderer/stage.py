@@ -139,6 +139,7 @@ class Stage:
             warnings.append("nothing of the scene can be seen through the window")
         report = {
             "technique": choice.technique,
+            "mvr": choice.mvr if choice.technique == "mvr" else None,
             "preset": choice.preset,
             "lod": choice.lod_rule,
             "views": plan.views,

@@ -26,8 +26,9 @@ def test_options_reach_the_renderer(
     out = tmp_path / "out.png"
     result = command(
         "render", scene, "-o", out, "--display", display, "--views", 5, "--view-size", "30x20",
-        "--technique", "mvr", "--preset", "paper", "--yaw", 90, "--depth-scale", 0.5, "--seed", 9,
-        "--repeat", 3, "--device", "software", "--spacing", "angle", "--lod", "long-axis",
+        "--technique", "mvr", "--mvr", "loop-4", "--preset", "paper", "--yaw", 90,
+        "--depth-scale", 0.5, "--seed", 9, "--repeat", 3, "--device", "software",
+        "--spacing", "angle", "--lod", "long-axis",
     )  # fmt: skip
     assert result.code == 0
     assert result.stdout == ""
@@ -44,6 +45,7 @@ def test_options_reach_the_renderer(
         "views": 5,
         "view_size": (30, 20),
         "technique": "mvr",
+        "mvr": "loop-4",
         "preset": "paper",
         "lookup": "lens",
         "weave": "nearest",

@@ -15,7 +15,7 @@ from lfd_render.gpu.device import Device
 from lfd_render.gpu.scene_buffers import SceneBuffers
 from lfd_render.passes import view_target
 from lfd_render.passes.placement import Placement
-from lfd_render.passes.raster import RasterForward
+from lfd_render.passes.raster_forward import RasterForward
 from lfd_render.passes.transform import Transform
 from lfd_render.passes.view_target import ViewTarget
 from lfd_render.reference import NO_TRIANGLE, Visibility, placed, visible

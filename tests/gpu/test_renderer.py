@@ -15,6 +15,8 @@ from lfd_render.passes.weave import Weave
 from lfd_render.renderer import Renderer
 from lfd_render.scene import Instance, Material, Mesh, Scene
 
+from .helpers import fill
+
 pytestmark = pytest.mark.needs("gl")
 
 SMALL = {"views": 3, "view_size": (40, 30)}
@@ -253,24 +255,21 @@ def test_views_on_a_boundary_and_far_centres_are_exact(
     profile = display.model_copy(update={"lens": lens, "panel": panel})
     from lfd_render.display import ViewGrid  # noqa: PLC0415 (beside what it is for)
     from lfd_render.gpu import raw as gl  # noqa: PLC0415
-    from lfd_render.gpu.framebuffer import LayerTarget  # noqa: PLC0415
     from lfd_render.gpu.scene_buffers import SceneBuffers  # noqa: PLC0415
     from lfd_render.passes.view_target import ViewTarget  # noqa: PLC0415
 
     grid = ViewGrid.lens(profile, 1)
     buffers = SceneBuffers(device, Scene.load("builtin:spheres?triangles=1000"))
     target = ViewTarget(device, profile.rig(views), grid, buffers.batches)
-    layer = LayerTarget(device, target.images, depth=False)
-    for view in range(views):  # half floats hold whole numbers up to 2048
-        layer.use(view)
-        layer.clear((view, view, view, 1.0))
+    numbers = np.arange(views)[:, None, None, None]  # half floats hold whole ones up to 2048
+    fill(device, target.images, np.broadcast_to(numbers, (views, 1, grid.columns, 3)))
     weave = Weave(device, profile, grid, views)
     weave(target.bands[0])
     found = weave.read_linear().astype(int)
     np.testing.assert_array_equal(found, profile.view_index_map(views))
     assert len(np.unique(found)) >= min(views, 100) // 2
     assert target.images.internal_format == gl.RGBA16F
-    for owner in (weave, layer, target, buffers):
+    for owner in (weave, target, buffers):
         owner.release()
 
 

@@ -78,10 +78,11 @@ def held(device: Device) -> tuple[object, ...]:
         {},
         {"splat": "two-pass"},
         {"technique": "mvr"},
+        {"technique": "mvr", "mvr": "instanced-4-partitioned-deferred"},
         {"preset": "paper"},
         {"preset": "paper", "point_source": "raster"},
     ],
-    ids=["owned", "two-pass", "mvr", "paper", "raster"],
+    ids=["owned", "two-pass", "mvr", "mvr-deferred", "paper", "raster"],
 )
 def test_frames_make_and_compile_nothing(
     device: Device, display: DisplayProfile, camera: Camera, options: dict[str, str]
