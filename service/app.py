@@ -16,9 +16,10 @@ from lfd_render.engine.lru import ByteLru
 from lfd_render.engine.pool import Pool
 from lfd_render.version import __version__
 
-from . import displays, health, pictures, problems, scenes
+from . import displays, health, jobs, pictures, problems, scenes
 from .display_store import DisplayStore
 from .guards import Bodies, Keys, SameSite
+from .job_store import JobStore
 from .journal import Journal, log_json
 from .metrics import Metrics
 from .scene_store import SceneStore
@@ -45,13 +46,16 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         with tempfile.TemporaryDirectory(prefix="lfd-render-") as temporary:
             folder = Path(chosen.data_dir or temporary)
+            stored = SceneStore(
+                folder / "scenes", chosen.limits, chosen.max_scenes, chosen.upload_bytes
+            )
+            jobs_made = JobStore(folder / "jobs", chosen, pool, stored)
             app.state.lfd = State(
                 chosen,
                 pool,
-                SceneStore(
-                    folder / "scenes", chosen.limits, chosen.max_scenes, chosen.upload_bytes
-                ),
+                stored,
                 DisplayStore(folder / "displays", chosen.max_displays),
+                jobs_made,
                 ByteLru(chosen.answer_cache_mb << 20),
                 metrics,
             )
@@ -60,6 +64,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             try:
                 yield
             finally:
+                await jobs_made.close()
                 await pool.drain(chosen.drain_s)
                 await pool.close()
 
@@ -71,7 +76,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         redoc_url=None,
     )
     problems.install(app)
-    for part in (health, scenes, pictures, displays):
+    for part in (health, scenes, pictures, jobs, displays):
         app.include_router(part.router)
     # The last one added is the outermost.
     app.add_middleware(Bodies, settings=chosen)

@@ -20,6 +20,7 @@ from lfd_render.engine.jobs import Job, ViewMap
 from .answers import answer
 from .display_store import inline, is_shipped
 from .fields import DisplayName, Fields
+from .jobs import LATER
 from .media import choose
 from .problems import ProblemError, responses
 from .state import Shared
@@ -182,6 +183,7 @@ class MapQuery(Fields):
                 for media in (encoding.PNG, encoding.NPY)
             },
         },
+        202: LATER,
         304: {"description": "The client has it."},
         **responses(406, 504),
     },

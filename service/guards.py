@@ -17,6 +17,7 @@ from collections.abc import Iterable
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from .clients import ClientGoneError
 from .problems import ProblemError, problem
 from .settings import Settings
 
@@ -187,8 +188,11 @@ class Bodies:
             return message
 
         async def patient(message: Message) -> None:
-            async with asyncio.timeout(_SEND_IDLE_S):
-                await send(message)
+            try:
+                async with asyncio.timeout(_SEND_IDLE_S):
+                    await send(message)
+            except TimeoutError:
+                raise ClientGoneError from None
 
         await self._app(scope, counted, patient)
 

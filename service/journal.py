@@ -14,7 +14,7 @@ from typing import Any
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from .answers import ClientGoneError
+from .clients import ClientGoneError
 from .metrics import Metrics
 from .problems import problem
 

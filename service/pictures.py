@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from typing import Annotated, Any, TypeVar
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi import Path as PathParameter
 
-from lfd_render.display import Camera
-
-from . import display_store
-from .answers import answer, job_of
+from .answers import answer
 from .fields import (
     AnyBody,
     AnyQuery,
@@ -22,6 +18,8 @@ from .fields import (
     ViewQuery,
     ViewsQuery,
 )
+from .jobs import LATER, IdempotencyKey, Prefer, wants_later
+from .orders import of_body, of_query
 from .problems import responses
 from .state import Shared, State
 
@@ -53,6 +51,7 @@ def _told(*media: str) -> dict[str, Any]:
                 "content": dict.fromkeys(media, _BYTES),
                 "headers": _HEADERS,
             },
+            202: LATER,
             304: {"description": "The client has it."},
             **responses(406, 504, 507),
         },
@@ -64,13 +63,9 @@ _PICTURE = ("image/png", "image/webp", "image/jpeg", "application/octet-stream")
 
 
 async def _of_query(request: Request, state: State, scene: str, query: AnyQuery) -> Response:
-    display = state.displays.get(query.display)
-    with state.scenes.source(scene) as source:
-        return await answer(
-            request,
-            state,
-            job_of(request, state, query, source=source, display=display, camera=query.camera),
-        )
+    accept, later = request.headers.get("accept"), wants_later(request)
+    with of_query(state, scene, query, accept, later=later) as job:
+        return await answer(request, state, job)
 
 
 def _get(path: str, summary: str, *media: str) -> Callable[[Handler], Handler]:
@@ -130,18 +125,14 @@ async def quilt(
     "/render", summary="A picture, with its display and camera spelt out",
     **_told(*_PANEL, "application/zip"),
 )  # fmt: skip
-async def render(request: Request, state: Shared, body: AnyBody) -> Response:
+async def render(
+    request: Request,
+    state: Shared,
+    body: AnyBody,
+    prefer: Prefer = None,
+    idempotency_key: IdempotencyKey = None,
+) -> Response:
     """Any of the pictures, of a display and from a camera that need no name."""
-    given = body.display
-    display = (
-        state.displays.get(given)
-        if isinstance(given, str)
-        else display_store.inline(json.dumps(given))
-    )
-    camera = Camera.from_json_dict(body.camera) if isinstance(body.camera, dict) else body.camera
-    with state.scenes.source(body.scene) as source:
-        return await answer(
-            request,
-            state,
-            job_of(request, state, body, source=source, display=display, camera=camera),
-        )
+    accept, later = request.headers.get("accept"), wants_later(request)
+    with of_body(state, body, accept, later=later) as job:
+        return await answer(request, state, job)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import re
 from http import HTTPStatus
 from typing import Any
@@ -16,18 +17,12 @@ from lfd_render.errors import BusyError, LfdError, OptionError, http_status
 
 MEDIA = "application/problem+json"
 _PICTURES = ("eia", "look", "views", "view", "quilt")
+# What the machine lacks: room on its disk, or handles for files.
+_FULL = {
+    errno.ENOSPC: 507, errno.EDQUOT: 507, errno.EROFS: 507,
+    errno.EMFILE: 503, errno.ENFILE: 503,
+}  # fmt: skip
 _TYPE = re.compile(r"[^\w]|^(?:int|float|str|bool|none)$")
-
-
-class Problem(BaseModel):
-    """What went wrong, as RFC 9457 says it; `field` is the part of the request at fault."""
-
-    type: str = "about:blank"
-    title: str = Field(examples=["Unprocessable Content"])
-    status: int = Field(examples=[422])
-    detail: str = Field(examples=["views: Input should be less than or equal to 1024"])
-    field: str | None = Field(None, examples=["views"])
-    request_id: str | None = Field(None, examples=["5f0c9d1c3a7b4e22"])
 
 
 class ProblemError(HTTPException):
@@ -44,6 +39,44 @@ class ProblemError(HTTPException):
         self.field = field
 
 
+class Problem(BaseModel):
+    """What went wrong, as RFC 9457 says it; `field` is the part of the request at fault."""
+
+    type: str = "about:blank"
+    title: str = Field(examples=["Unprocessable Content"])
+    status: int = Field(examples=[422])
+    detail: str = Field(examples=["views: Input should be less than or equal to 1024"])
+    field: str | None = Field(None, examples=["views"])
+    request_id: str | None = Field(None, examples=["5f0c9d1c3a7b4e22"])
+
+    @staticmethod
+    def of(error: ProblemError, request_id: str | None = None) -> Problem:
+        """As JSON says it."""
+        return Problem(
+            title=HTTPStatus(error.status_code).phrase, status=error.status_code,
+            detail=error.detail, field=error.field, request_id=request_id,
+        )  # fmt: skip
+
+
+def as_problem(error: BaseException) -> ProblemError:
+    """The problem that an error is to whoever made the request."""
+    if isinstance(error, ProblemError):
+        return error
+    if isinstance(error, OSError) and error.errno in _FULL:
+        status = _FULL[error.errno]
+        headers = {"Retry-After": "5"} if status == HTTPStatus.SERVICE_UNAVAILABLE else None
+        return ProblemError(status, f"{error.strerror}; ask again later", None, headers)
+    if not isinstance(error, LfdError):
+        return ProblemError(500, "internal error; the server's log says more")
+    status, headers = http_status(error), None
+    if isinstance(error, BusyError):
+        headers = {"Retry-After": str(error.retry_after_s)}
+    elif status == HTTPStatus.SERVICE_UNAVAILABLE:
+        headers = {"Retry-After": "5"}
+    field = error.option if isinstance(error, OptionError) else _named(str(error))
+    return ProblemError(status, str(error), field, headers)
+
+
 def problem(
     request_id: str | None,
     status: int,
@@ -52,10 +85,7 @@ def problem(
     headers: dict[str, str] | None = None,
 ) -> Response:
     """The response that tells of a problem."""
-    told = Problem(
-        title=HTTPStatus(status).phrase, status=status, detail=detail, field=field,
-        request_id=request_id,
-    )  # fmt: skip
+    told = Problem.of(ProblemError(status, detail, field), request_id)
     body = told.model_dump_json(exclude_none=True)
     return Response(body, status, headers, MEDIA)
 
@@ -86,20 +116,18 @@ def install(app: FastAPI) -> None:
         return problem(request.scope.get("request_id"), status, detail, field, headers)
 
     @app.exception_handler(ProblemError)
-    async def own(request: Request, error: ProblemError) -> Response:
-        headers = dict(error.headers) if error.headers else None
-        return answer(request, error.status_code, error.detail, error.field, headers)
-
     @app.exception_handler(LfdError)
-    async def lfd(request: Request, error: LfdError) -> Response:
-        headers = None
-        if isinstance(error, BusyError):
-            headers = {"Retry-After": str(error.retry_after_s)}
-        field = error.option if isinstance(error, OptionError) else _named(str(error))
-        status = http_status(error)
-        if status == HTTPStatus.SERVICE_UNAVAILABLE:
-            headers = {"Retry-After": "5"}
-        return answer(request, status, str(error), field, headers)
+    @app.exception_handler(InternalError)
+    async def own(request: Request, error: Exception) -> Response:
+        told = as_problem(error)
+        headers = dict(told.headers) if told.headers else None
+        return answer(request, told.status_code, told.detail, told.field, headers)
+
+    @app.exception_handler(OSError)
+    async def full(request: Request, error: OSError) -> Response:
+        if error.errno not in _FULL:
+            raise error
+        return await own(request, error)
 
     @app.exception_handler(RequestValidationError)
     async def invalid(request: Request, error: RequestValidationError) -> Response:
@@ -111,10 +139,6 @@ def install(app: FastAPI) -> None:
     async def http(request: Request, error: HTTPException) -> Response:
         headers = dict(error.headers) if error.headers else None
         return answer(request, error.status_code, str(error.detail), None, headers)
-
-    @app.exception_handler(InternalError)
-    async def internal(request: Request, error: InternalError) -> Response:
-        return answer(request, 500, "internal error; the server's log says more")
 
 
 def _place(location: tuple[int | str, ...]) -> str:

@@ -54,6 +54,14 @@ class Settings(BaseModel):
     scene_cache_mb: int = Field(1024, ge=0, description="Parsed scenes that a process keeps.")
     frame_cache_mb: int = Field(256, ge=0, description="Panel images that a process keeps.")
     answer_cache_mb: int = Field(256, ge=0, description="Encoded pictures that the server keeps.")
+    job_deadline_s: Seconds = Field(3600.0, description="Seconds a picture of a job may take.")
+    max_job_view_pixels: Whole = Field(
+        1 << 31, description="As max_view_pixels, of a picture that is made in the background."
+    )
+    job_keep_s: Seconds = Field(3600.0, description="Seconds a job is kept after its end.")
+    job_results_mb: Whole = Field(1024, description="Pictures of jobs that are kept on disk.")
+    max_jobs: Whole = Field(100, description="Jobs at a time, those that have ended included.")
+    max_streams: Whole = Field(16, description="Streams at a time.")
     max_upload_mb: Whole = Field(256, description="Size of an uploaded scene, all files together.")
     max_scenes: Whole = Field(1000, description="Uploaded scenes that are kept at a time.")
     max_displays: Whole = Field(1000, description="Displays that are kept besides those shipped.")

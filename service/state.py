@@ -12,17 +12,11 @@ from lfd_render.engine.lru import ByteLru
 from lfd_render.engine.pool import Pool
 
 from .display_store import DisplayStore
+from .job_store import JobStore
 from .metrics import Metrics
+from .picture import Picture
 from .scene_store import SceneStore
 from .settings import Settings
-
-
-@dataclass(frozen=True)
-class Picture:
-    """An encoded picture with what its answer's header says."""
-
-    body: memoryview
-    headers: dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -33,6 +27,7 @@ class State:
     pool: Pool
     scenes: SceneStore
     displays: DisplayStore
+    jobs: JobStore
     answers: ByteLru[Picture]
     metrics: Metrics
 

@@ -20,6 +20,7 @@ from lfd_render.engine.process import RenderProcess
 from lfd_render.engine.worker import WorkerConfig
 from lfd_render.errors import (
     BusyError,
+    CancelledError,
     DeadlineError,
     GpuError,
     PoisonError,
@@ -32,6 +33,7 @@ _WATCH_S = 0.1
 _MOST_DEATHS = 2  # of processes at a scene, before it is refused
 _MOST_KILLS = 4  # of processes at a job by others, before it is given up
 _PATIENCE_S = 1.0  # how long the first in the queue lets others go where their scene is warm
+_QUIET_S = 2.0  # nobody asks for so long before the only process turns to the background
 _MOST_FAILED_STARTS = 3  # in a row, until which a new process is tried at once
 
 
@@ -64,13 +66,16 @@ class _Ticket:
     started: float = 0.0
     kills: int = 0
     progress: Callable[[float], None] | None = None
+    background: bool = False
+    yields: bool = False  # called off for the sake of others, to be done again
 
 
 class Pool:
     """Render processes, each with one context for life, and the jobs that wait for them.
 
     A job goes to the process that has most of what it needs. It is done again when its process
-    dies; a scene at which processes die twice is refused from then on.
+    dies; a scene at which processes die twice is refused from then on. Jobs in the background leave
+    one process to the others; where there is but one, they give way, and are begun again in a lull.
     """
 
     def __init__(self, settings: PoolSettings) -> None:
@@ -84,6 +89,7 @@ class Pool:
         self._trouble = ""
         self._draining = False
         self._mean_s = 1.0  # of a job
+        self._asked = -_QUIET_S  # when there last was a job that is not in the background
         self._watch: asyncio.Task[None] | None = None
         self._changed = asyncio.Event()
 
@@ -104,19 +110,21 @@ class Pool:
         *,
         deadline_s: float | None = None,
         progress: Callable[[float], None] | None = None,
+        background: bool = False,
     ) -> Result:
         """The job's result, with the milliseconds it waited as `queue` in its timings.
 
+        A job in the background waits for all others; its caller bounds how many there are.
         Cancelling the caller calls the job off. Raises BusyError when the queue is full,
         DeadlineError, PoisonError, UnavailableError, InternalError, and the job's own errors.
         """
-        self._check(job)
+        self._check(job, background)
         now = time.monotonic()
         seconds = self.settings.deadline_s if deadline_s is None else deadline_s
         self._number += 1
         ticket = _Ticket(
             self._number, job, asyncio.get_running_loop().create_future(), now + seconds, now,
-            progress=progress,
+            progress=progress, background=background,
         )  # fmt: skip
         self._waiting.append(ticket)
         self._dispatch()
@@ -191,6 +199,11 @@ class Pool:
         return any(process.software for process in self._busy)
 
     @property
+    def background_lanes(self) -> int:
+        """How many jobs in the background are done at once."""
+        return max(1, self.settings.processes - 1)
+
+    @property
     def accepting(self) -> bool:
         """Whether a job would be taken and done."""
         return not self._draining and self.ready > 0
@@ -210,7 +223,7 @@ class Pool:
         """Scenes that are refused."""
         return [scene for scene, deaths in self._deaths.items() if deaths >= _MOST_DEATHS]
 
-    def _check(self, job: Job) -> None:
+    def _check(self, job: Job, background: bool) -> None:
         if self._draining:
             raise UnavailableError("the server is going down; ask again")
         if job.scene and self._deaths[job.scene.id] >= _MOST_DEATHS:
@@ -218,13 +231,12 @@ class Pool:
                 f"{job.scene.name}: ended {_MOST_DEATHS} render processes and is refused; "
                 "give another scene"
             )
-        if len(self._waiting) >= self.settings.queue:
+        waiting = sum(not ticket.background for ticket in self._waiting)
+        if waiting >= self.settings.queue and not background:
             self.counts["refused"] += 1
-            ahead = self._mean_s * (len(self._waiting) + 1) / self.settings.processes
+            ahead = self._mean_s * (waiting + 1) / self.settings.processes
             wait_s = max(1, round(ahead))
-            raise BusyError(
-                f"{len(self._waiting)} pictures are waiting; ask again in {wait_s} s", wait_s
-            )
+            raise BusyError(f"{waiting} pictures are waiting; ask again in {wait_s} s", wait_s)
 
     def _spawn(self) -> None:
         self._busy[RenderProcess(self.settings.worker, self._heard, self._ended)] = None
@@ -232,21 +244,44 @@ class Pool:
     def _dispatch(self) -> None:
         """Give waiting jobs to idle processes."""
         while self._waiting:
+            candidates = self._candidates()
             idle = [p for p, ticket in self._busy.items() if p.renderer and ticket is None]
             if not idle:
+                self._make_way(candidates)
+            if not idle or not candidates:
                 return
-            process, ticket = self._match(idle)
+            process, ticket = self._match(idle, candidates)
             self._waiting.remove(ticket)
             ticket.started = time.monotonic()
             self._busy[process] = ticket
             process.send(Work(ticket.number, ticket.job))
 
-    def _match(self, idle: list[RenderProcess]) -> tuple[RenderProcess, _Ticket]:
+    def _candidates(self) -> list[_Ticket]:
+        """The jobs of which one goes next: those in the background when no others wait, and as
+        long as they keep none waiting."""
+        waiting = [ticket for ticket in self._waiting if not ticket.background]
+        running = sum(ticket is not None and ticket.background for ticket in self._busy.values())
+        lull = len(self._busy) > 1 or time.monotonic() - self._asked > _QUIET_S
+        return waiting or (self._waiting if lull and running < self.background_lanes else [])
+
+    def _make_way(self, candidates: list[_Ticket]) -> None:
+        """Call off a job in the background if nothing else runs that the candidates could await."""
+        running = [(p, ticket) for p, ticket in self._busy.items() if ticket]
+        if any(not ticket.background or ticket.yields for _, ticket in running):
+            return
+        if running and any(not ticket.background for ticket in candidates):
+            process, ticket = running[0]
+            ticket.yields = True
+            process.send(Cancel(ticket.number))
+
+    def _match(
+        self, idle: list[RenderProcess], candidates: list[_Ticket]
+    ) -> tuple[RenderProcess, _Ticket]:
         """The job that goes next and the process it goes to: the first, unless one behind it finds
         its scene warm and the first has not waited long."""
-        first = self._waiting[0]
+        first = candidates[0]
         patient = time.monotonic() - first.submitted < _PATIENCE_S
-        candidates = self._waiting if patient else [first]
+        candidates = candidates if patient else [first]
         # max takes the first of equals: the oldest job, and the process that idles.
         return max(
             ((process, ticket) for ticket in candidates for process in idle),
@@ -278,8 +313,12 @@ class Pool:
         if ticket is not None:
             assert ticket.number == message.number
             taken = time.monotonic() - ticket.started
-            self._mean_s += 0.1 * (taken - self._mean_s)
-            if isinstance(message, Failed):
+            if not ticket.background:
+                self._mean_s += 0.1 * (taken - self._mean_s)
+            yielded, ticket.yields = ticket.yields, False
+            if yielded and _called_off(message) and not ticket.answer.done():
+                self._waiting.append(self._renumbered(ticket))
+            elif isinstance(message, Failed):
                 self._fail(ticket, _error(message))
             elif not ticket.answer.done():
                 ticket.answer.set_result(message.result)
@@ -308,6 +347,12 @@ class Pool:
             self._mourn(process, ticket)
         self._changed.set()
 
+    def _renumbered(self, ticket: _Ticket) -> _Ticket:
+        """The ticket under a number that has not been called off."""
+        self._number += 1
+        ticket.number = self._number
+        return ticket
+
     def _spawn_later(self) -> None:
         if not self._draining and len(self._busy) < self.settings.processes:
             self._spawn()
@@ -327,6 +372,7 @@ class Pool:
                 PoisonError(f"{scene.name}: rendering it ends the process; give another scene"),
             )
         elif not ticket.answer.done():
+            ticket.yields = False
             self._waiting.insert(0, ticket)
             self._dispatch()
 
@@ -341,6 +387,8 @@ class Pool:
         for process, running in self._busy.items():
             if running is ticket:
                 process.send(Cancel(ticket.number))
+        if not ticket.background:
+            self._asked = time.monotonic()
         self._changed.set()
 
     async def _watch_over(self) -> None:
@@ -348,6 +396,7 @@ class Pool:
         limit = self.settings.worker.memory_bytes
         while True:
             await asyncio.sleep(_WATCH_S)
+            self._dispatch()  # what waited for a lull
             now = time.monotonic()
             for process, ticket in self._busy.items():
                 late = ticket and now > ticket.deadline + self.settings.grace_s
@@ -378,6 +427,10 @@ def _warmth(process: RenderProcess, job: Job) -> int:
 
 def _scene(ticket: _Ticket | None) -> str | None:
     return ticket.job.scene.id if ticket and ticket.job.scene else None
+
+
+def _called_off(message: Done | Failed) -> bool:
+    return isinstance(message, Failed) and message.kind == CancelledError.__name__
 
 
 def _error(failed: Failed) -> Exception:
