@@ -6,11 +6,14 @@ are converted, JSON's values are not.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
 
 from lfd_render.display import Camera
+from lfd_render.display.model import Spacing
 from lfd_render.engine.choices import Choices
 from lfd_render.engine.jobs import (
     AllViews,
@@ -22,7 +25,18 @@ from lfd_render.engine.jobs import (
 )
 from lfd_render.engine.texts import parse_exposure, parse_size, parse_supersample
 from lfd_render.errors import OptionError
+from lfd_render.gpu.layout import LOD_RULES
 from lfd_render.panel.eyes import EYES_APART_MM
+from lfd_render.panel.stage import LIGHTS
+from lfd_render.passes.sampling import (
+    CULLINGS,
+    DENSITIES,
+    LATTICES,
+    POINT_SOURCES,
+    SHADE_PLACES,
+)
+from lfd_render.passes.view_buffers import WINNERS
+from lfd_render.renderer.options import ENVIRONMENTS, PRESETS, TECHNIQUES
 
 DEFAULT_DISPLAY = "gavane-2024-tilted-4k"
 
@@ -41,6 +55,32 @@ ViewCount = Annotated[int, Field(ge=1, le=1024)]
 Flag = bool | None
 
 
+class OneOf:
+    """One of these texts, and told so in OpenAPI: the renderer's own tables say which."""
+
+    def __init__(self, choices: Sequence[str]) -> None:
+        self._choices = list(choices)
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """As pydantic asks for it."""
+        return core_schema.literal_schema(self._choices)
+
+
+Technique = Annotated[str, OneOf(TECHNIQUES)]
+Preset = Annotated[str, OneOf(PRESETS)]
+Lod = Annotated[str, OneOf(LOD_RULES)]
+Lattice = Annotated[str, OneOf(LATTICES)]
+PointSource = Annotated[str, OneOf(POINT_SOURCES)]
+Density = Annotated[str, OneOf(DENSITIES)]
+Culling = Annotated[str, OneOf(CULLINGS)]
+ShadePlace = Annotated[str, OneOf(SHADE_PLACES)]
+Splat = Annotated[str, OneOf(WINNERS)]
+FilterLight = Annotated[str, OneOf(LIGHTS)]
+Ambient = Annotated[str, OneOf(ENVIRONMENTS)]
+
+
 class Fields(BaseModel):
     """Base of all requests: nothing unknown, nothing that is not finite."""
 
@@ -56,7 +96,7 @@ class Placed(Fields):
     focus_distance: Positive | None = Field(
         None, description="With the name of a camera: from there to the window, in scene units."
     )
-    environment: Literal["studio", "none"] = Field("studio", description="Light all around.")
+    environment: Ambient = Field("studio", description="Light all around.")
     environment_turn: Degrees = Field(0.0, description="Turn the environment about +y.")
     environment_intensity: float = Field(1.0, ge=0, le=65504, description="Scale its light.")
     exposure: Annotated[str, Field(max_length=40)] | None = Field(
@@ -67,11 +107,11 @@ class Placed(Fields):
 class Views(Placed):
     """How views are rendered."""
 
-    technique: Literal["lfdpr", "mvr"] = Field("lfdpr", description="Rendering technique.")
+    technique: Technique = Field("lfdpr", description="Rendering technique.")
     mvr: Annotated[str, Field(max_length=60)] = Field(
         "multipass", description="Variant of technique mvr.", examples=["loop-4-deferred"]
     )
-    preset: Literal["default", "paper", "gold"] = Field(
+    preset: Preset = Field(
         "default", description="Choices of the technique: ours, the paper's, or slow and finest."
     )
     supersample: Annotated[str, Field(max_length=20)] = Field(
@@ -80,19 +120,19 @@ class Views(Placed):
     view_size: Size | None = Field(
         None, description="Columns x rows of a view; else the display's.", examples=["480x360"]
     )
-    spacing: Literal["lens", "angle", "tangent"] | None = Field(
+    spacing: Spacing | None = Field(
         None, description="Rule by which the eyes are spaced; else the display's."
     )
-    lod: Literal["none", "area", "long-axis", "multiview", "anisotropic"] | None = Field(
+    lod: Lod | None = Field(
         None, description="How textures are filtered; else as the preset has it."
     )
-    lattice: Literal["rows", "paper"] | None = None
-    point_source: Literal["compute", "raster"] | None = None
-    density: Literal["lfd", "isotropic"] | None = None
+    lattice: Lattice | None = None
+    point_source: PointSource | None = None
+    density: Density | None = None
     texture_limit: Flag = None
-    culling: Literal["exact", "vertices"] | None = None
+    culling: Culling | None = None
     stochastic_culling: Flag = None
-    shade: Literal["ray", "point"] | None = None
+    shade: ShadePlace | None = None
     seed: int = Field(0, ge=0, le=2**32 - 1, description="Seed of all random choices.")
 
     @property
@@ -127,8 +167,8 @@ class EiaFields(Views):
     aa: Literal["none", "spatial", "angular", "both"] | None = Field(
         None, description="Filter over view pixels, views or both; else as the preset has it."
     )
-    aa_light: Literal["linear", "encoded"] = "linear"
-    splat: Literal["auto", "int64", "two-pass", "owned"] = "auto"
+    aa_light: FilterLight = "linear"
+    splat: Splat = "auto"
     lossy: bool = Field(
         False, description="Allow image/jpeg, whose loss mixes the views of neighbouring pixels."
     )

@@ -132,7 +132,7 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(RequestValidationError)
     async def invalid(request: Request, error: RequestValidationError) -> Response:
         first = error.errors()[0]
-        field = _place(first["loc"])
+        field = "body" if first["type"] == "json_invalid" else _place(first["loc"])
         return answer(request, 422, f"{field}: {first['msg']}", field)
 
     @app.exception_handler(HTTPException)
