@@ -14,6 +14,7 @@ from starlette.middleware.cors import CORSMiddleware
 
 from lfd_render.engine.lru import ByteLru
 from lfd_render.engine.pool import Pool
+from lfd_render.errors import GpuError
 from lfd_render.version import __version__
 
 from . import displays, health, jobs, pictures, problems, scenes
@@ -59,7 +60,11 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                 ByteLru(chosen.answer_cache_mb << 20),
                 metrics,
             )
-            await pool.start()
+            try:
+                await pool.start()
+            except GpuError as error:
+                app.state.failure = error
+                raise
             app.openapi()  # made once: it takes a third of a second, during which nobody is served
             try:
                 yield
@@ -75,6 +80,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         lifespan=lifespan,
         redoc_url=None,
     )
+    app.state.failure = None  # why it could not start
     problems.install(app)
     for part in (health, scenes, pictures, jobs, displays):
         app.include_router(part.router)

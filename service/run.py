@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import socket
 from collections.abc import Callable
 
@@ -38,7 +39,15 @@ def run(settings: Settings, say: Callable[[str], None]) -> None:
             ),
             lambda: say(f"listening on http://{said}:{port}"),
         )  # fmt: skip
-        server.run(sockets=[listener])
+        # Why the application cannot start is raised, not logged as a trace.
+        logging.getLogger("uvicorn.error").addFilter(lambda _: app.state.failure is None)
+        try:
+            server.run(sockets=[listener])
+        except SystemExit:
+            if app.state.failure is None:
+                raise
+    if app.state.failure is not None:
+        raise app.state.failure
 
 
 def _listening(settings: Settings) -> socket.socket:

@@ -10,7 +10,6 @@ from fastapi import Path as PathParameter
 from fastapi.concurrency import run_in_threadpool
 from pydantic import BaseModel, Field
 from starlette.datastructures import UploadFile
-from starlette.formparsers import MultiPartException
 
 from lfd_render.engine import encoding
 from lfd_render.engine.jobs import Job, SceneFacts
@@ -145,10 +144,7 @@ async def _take(pieces: AsyncIterator[bytes], upload: Upload, name: str) -> None
 
 async def _take_form(request: Request, upload: Upload) -> str | None:
     """Take the files of a form; the one that it says is the scene."""
-    try:
-        form = await request.form(max_files=_MOST_PARTS, max_fields=8, max_part_size=1 << 16)
-    except MultiPartException as error:
-        raise ProblemError(422, f"body: {error.message}", "body") from None
+    form = await request.form(max_files=_MOST_PARTS, max_fields=8, max_part_size=1 << 16)
     try:
         main = None
         for field, value in form.multi_items():

@@ -47,6 +47,9 @@ class Settings(BaseModel):
     )
     queue: Whole = Field(32, description="Pictures that may wait for a render process.")
     deadline_s: Seconds = Field(60.0, description="Seconds a picture may take, queue included.")
+    grace_s: Seconds = Field(
+        5.0, description="Seconds after that until a process which does not stop is ended."
+    )
     drain_s: Seconds = Field(30.0, description="Seconds that pictures get when the server ends.")
     process_memory_mb: int = Field(
         8192, ge=0, description="Memory of a render process; one that takes more is ended. 0: any."
@@ -101,7 +104,7 @@ class Settings(BaseModel):
             frame_bytes=self.frame_cache_mb * _MIB,
             memory_bytes=self.process_memory_mb * _MIB,
         )
-        return PoolSettings(self.processes, self.queue, self.deadline_s, worker=worker)
+        return PoolSettings(self.processes, self.queue, self.deadline_s, self.grace_s, worker)
 
     @property
     def upload_bytes(self) -> int:
