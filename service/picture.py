@@ -5,11 +5,26 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lfd_render.engine import encoding
-from lfd_render.engine.jobs import Job, Result
+from lfd_render.engine.jobs import (
+    AllViews,
+    Job,
+    OneView,
+    PanelImage,
+    Product,
+    QuiltPicture,
+    Result,
+    SceneFacts,
+    Seen,
+    ViewMap,
+)
 
 _SUFFIXES = {
     encoding.PNG: "png", encoding.WEBP: "webp", encoding.JPEG: "jpg", encoding.EXR: "exr",
     encoding.RAW: "raw", encoding.ZIP: "zip", encoding.NPY: "npy",
+}  # fmt: skip
+_NAMES: dict[type[Product], str] = {
+    PanelImage: "eia", Seen: "look", OneView: "view", AllViews: "views", QuiltPicture: "quilt",
+    SceneFacts: "scene", ViewMap: "map",
 }  # fmt: skip
 
 
@@ -27,7 +42,7 @@ class Picture:
         headers = {"LFD-Size": "x".join(map(str, report["size"]))}
         if warnings := report.get("warnings"):
             headers["LFD-Warnings"] = _header_text("; ".join(warnings))
-        name = type(job.product).__name__.lower()
+        name = _NAMES[type(job.product)]
         headers["Content-Disposition"] = f'inline; filename="{name}.{_SUFFIXES[job.media]}"'
         return Picture(memoryview(result.body), headers)
 
