@@ -267,12 +267,14 @@ class TextureArray(Owned):
         raw = self._device.raw
         raw.glBindImageTexture(unit, self.name, level, 1, 0, access, self.internal_format)
 
-    def read(self, dtype: DTypeLike, gl_type: int, level: int = 0) -> NDArray[Any]:
-        """A level as [layer, y, x, 4]. Waits for the device."""
+    def read(
+        self, dtype: DTypeLike, gl_type: int, level: int = 0, *, channels: int = gl.RGBA
+    ) -> NDArray[Any]:
+        """A level as [layer, y, x, 4], or [layer, y, x] of one channel. Waits for the device."""
         size = (max(1, self.height >> level), max(1, self.width >> level))
-        pixels = np.empty((self.layers, *size, 4), dtype)
+        pixels = np.empty((self.layers, *size, *([4] if channels == gl.RGBA else [])), dtype)
         self._device.raw.glGetTextureImage(
-            self.name, level, gl.RGBA, gl_type, pixels.nbytes, pixels.ctypes.data
+            self.name, level, channels, gl_type, pixels.nbytes, pixels.ctypes.data
         )
         return pixels
 

@@ -10,6 +10,10 @@ invocations · ≈ OVR_multiview. □-□ a framebuffer a view · ⊞ one, parti
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from lfd_render.gpu.device import Device
 
@@ -187,6 +191,14 @@ class Parts:
         """Width, height and layers of the textures."""
         down = -(-self.a_layer // self.across)
         return self.across * self.columns, down * self.rows, -(-self.views // self.a_layer)
+
+    def split(self, pixels: NDArray[Any]) -> NDArray[Any]:
+        """Views [view, row, column, …] of textures [layer, y, x, …]."""
+        views = np.empty((self.views, self.rows, self.columns, *pixels.shape[3:]), pixels.dtype)
+        for view in range(self.views):
+            x, y, layer = self.corner(view)
+            views[view] = pixels[layer, y : y + self.rows, x : x + self.columns]
+        return views
 
     def corner(self, view: int) -> tuple[int, int, int]:
         """Column, row and layer of a view's first pixel."""

@@ -204,7 +204,10 @@ class Raster:
 
 
 class BandRaster:
-    """A raster of the views of a ViewTarget, band by band."""
+    """A raster of the views of a ViewTarget, band by band.
+
+    colors: its own textures, [layer, y, x], views in their `parts`; none where it draws images.
+    """
 
     def __init__(
         self,
@@ -224,14 +227,14 @@ class BandRaster:
         images, where views are layers."""
         assert lod != "multiview"  # which needs points
         self._device = device
-        self._target = target
+        self.target = target
         self.parts = Parts.of(pipeline, target.rig.views, target.grid.columns, target.band_rows)
-        self._own = [
+        self.colors = [
             TextureArray(device, "raster", self.parts.size, internal_format)
             for internal_format in formats
             if pipeline.partitioned or not into_images
         ]
-        for texture in self._own:
+        for texture in self.colors:
             texture.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
         self.raster = Raster(
             device,
@@ -239,7 +242,7 @@ class BandRaster:
             self.parts,
             pipeline=pipeline,
             fragment=fragment,
-            colors=self._own or [target.images],
+            colors=self.colors or [target.images],
             constants={**scene.lighting.constants(), **lod_constants(lod)},
             components=components,
             keep_depth=keep_depth,
@@ -253,7 +256,7 @@ class BandRaster:
     def release(self) -> None:
         """Free everything but the target."""
         self.raster.release()
-        for texture in self._own:
+        for texture in self.colors:
             texture.release()
         for views in self.views.values():
             views.release()

@@ -50,7 +50,7 @@ class RasterForward(BandRaster):
 
     def gather(self, band: Band) -> None:
         """Bring views that are parts of a texture into the target's images."""
-        for view in range(self._target.rig.views) if self._own else ():
-            self._target.images.copy_part(
-                self._own[0], view, self.parts.corner(view), (self.parts.columns, band.rows)
+        for view in range(self.target.rig.views) if self.colors else ():
+            self.target.images.copy_part(
+                self.colors[0], view, self.parts.corner(view), (self.parts.columns, band.rows)
             )

@@ -18,9 +18,7 @@ _GROUP = 64  # local_size_x of raster/gather.comp
 
 
 class RasterIds(BandRaster):
-    """SceneBuffers, views → the nearest triangle of each pixel; gathered, they are Winners."""
-
-    word_stride = 1
+    """SceneBuffers, views → the nearest triangle of each pixel: its global id, or NO_TRIANGLE."""
 
     def __init__(
         self,
@@ -39,8 +37,12 @@ class RasterIds(BandRaster):
             components=BARE if modes == {"opaque"} else SHADED,
             keep_depth="blend" in modes,
         )  # fmt: skip
-        self._gather = Kernel(device, "raster/gather.comp")
-        self.words = Buffer(device, "view buffers", 4 * target.band_pixels)
+
+    def __call__(self, step: int, band: Band, placement: Placement) -> None:
+        """Draw all, blended triangles where their alpha shows at all."""
+        self.raster.clear(step, CONSTANTS["NO_TRIANGLE"])
+        with self.raster.rasterising():
+            self.raster.draw(step, (*SOLID, *BLENDED), self.views[band], band.rows, placement)
 
     def solid(self, step: int, band: Band, placement: Placement) -> None:
         """Draw what does not blend."""
@@ -55,21 +57,30 @@ class RasterIds(BandRaster):
         with self.raster.rasterising(), over_equal_depth(self._device):
             self.raster.draw(step, BLENDED, self.views[band], band.rows, placement)
 
-    def gather(self, band: Band) -> None:
-        """Write the words, as shading reads them."""
-        columns, views = self.parts.columns, self.parts.views
-        self._gather.set(
+
+class GatherIds:
+    """RasterIds → Winners, as shading reads them, [row of the band, view, column]."""
+
+    word_stride = 1
+
+    def __init__(self, device: Device, target: ViewTarget) -> None:
+        self._kernel = Kernel(device, "raster/gather.comp")
+        self.words = Buffer(device, "view buffers", 4 * target.band_pixels)
+
+    def __call__(self, ids: RasterIds, band: Band) -> None:
+        """Gather the views of a band."""
+        parts = ids.parts
+        self._kernel.set(
             {"Words": self.words},
             {
-                "view_size": (columns, band.rows, views),
-                "parts": (self.parts.across, self.parts.a_layer, self.parts.rows),
+                "view_size": (parts.columns, band.rows, parts.views),
+                "parts": (parts.across, parts.a_layer, parts.rows),
             },
-            {"id_images": self._own[0]},
+            {"id_images": ids.colors[0]},
         )
-        self._gather.run((-(-columns // _GROUP), band.rows, views))
+        self._kernel.run((-(-parts.columns // _GROUP), band.rows, parts.views))
 
     def release(self) -> None:
-        """Free everything but the target."""
-        super().release()
-        self._gather.release()
+        """Free the kernel and the words."""
+        self._kernel.release()
         self.words.release()

@@ -14,7 +14,7 @@ from lfd_render.gpu.scene_buffers import SceneBuffers
 from lfd_render.passes.pipelines import BARE, PIPELINES, SHADED, Pipeline
 from lfd_render.passes.placement import Placement
 from lfd_render.passes.raster_forward import RasterForward
-from lfd_render.passes.raster_ids import RasterIds
+from lfd_render.passes.raster_ids import GatherIds, RasterIds
 from lfd_render.passes.shade import NoPoints, Shade
 from lfd_render.passes.transform import Transform
 from lfd_render.passes.view_target import Band, ViewTarget
@@ -55,7 +55,7 @@ def supported(device: Device, views: int) -> tuple[str, ...]:
     return tuple(variant for variant in VARIANTS if problem(device, variant, views) is None)
 
 
-class _Rasterised:
+class Rasterised:
     """transform, then what a subclass renders of each band."""
 
     winners = None
@@ -99,7 +99,7 @@ class _Rasterised:
         self.target.release()
 
 
-class ForwardMvr(_Rasterised):
+class ForwardMvr(Rasterised):
     """transform → raster, pass by pass."""
 
     def __init__(
@@ -128,7 +128,7 @@ class ForwardMvr(_Rasterised):
         super().release()
 
 
-class DeferredMvr(_Rasterised):
+class DeferredMvr(Rasterised):
     """transform → raster (ids), pass by pass → gather → shade.
 
     Blended materials show their nearest layer, drawn and shaded over the solid ones.
@@ -146,7 +146,8 @@ class DeferredMvr(_Rasterised):
         """lod: one of LOD_RULES, without `multiview`."""
         super().__init__(device, scene, target)
         self._raster = RasterIds(device, scene, target, lod=lod, pipeline=pipeline)
-        self._shade = Shade(device, scene, target, self._raster.word_stride, lod=lod)
+        self._gather = GatherIds(device, target)
+        self._shade = Shade(device, scene, target, self._gather.word_stride, lod=lod)
         self._no_points = NoPoints(device)
 
     def render(self, band: Band, clock: StageClock) -> None:
@@ -158,19 +159,19 @@ class DeferredMvr(_Rasterised):
             for step in self._raster.steps:
                 self._raster.solid(step, band, self._placement)
         with clock.stage("gather"):
-            self._raster.gather(band)
+            self._gather(self._raster, band)
         with clock.stage("shade"):
-            self._shade.opaque(solid, band, self._raster, self._placement)
+            self._shade.opaque(solid, band, self._gather, self._placement)
         if blended:
             with clock.stage("blend"):
                 for step in self._raster.steps:
                     self._raster.blended(step, band, self._placement)
-                self._raster.gather(band)
-                self._shade.blend(blended, band, self._raster, self._placement)
+                self._gather(self._raster, band)
+                self._shade.blend(blended, band, self._gather, self._placement)
 
     def release(self) -> None:
         """Free passes and target."""
-        for owner in (self._raster, self._shade, self._no_points):
+        for owner in (self._raster, self._gather, self._shade, self._no_points):
             owner.release()
         super().release()
 

@@ -45,6 +45,14 @@ vec3 mapped_normal(vec3 normal, Surface surface, uint slot) {
     return normalize((m.x * tangent + m.y * side * bitangent) * inversesqrt(length_2) + m.z * normal);
 }
 
+// Unit, to the side that is seen.
+vec3 shading_normal(Surface surface) {
+    vec3 normal = surface.normal * inversesqrt(max(1e-20, dot(surface.normal, surface.normal)));
+    uint slot = slot_of(surface.material, NORMAL);
+    if (slot != NO_TEXTURE) normal = mapped_normal(normal, surface, slot);
+    return surface.back ? -normal : normal;
+}
+
 // Environment BRDF: scale and bias of the specular colour, a polynomial fit by Karis (2014, "Physically
 // based shading on mobile").
 vec2 environment_brdf(float roughness, float n_dot_v) {
@@ -120,11 +128,7 @@ vec4 shade(Surface surface) {
     vec3 orm = occlusion_roughness_metallic(surface);
     float roughness = orm.g, metallic = orm.b;
 
-    vec3 normal = surface.normal * inversesqrt(max(1e-20, dot(surface.normal, surface.normal)));
-    uint slot = slot_of(surface.material, NORMAL);
-    if (slot != NO_TEXTURE) normal = mapped_normal(normal, surface, slot);
-    if (surface.back) normal = -normal;
-
+    vec3 normal = shading_normal(surface);
     Facet facet;
     facet.normal = normal;
     facet.view = normalize(surface.to_eye);

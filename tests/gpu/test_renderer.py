@@ -20,6 +20,7 @@ from .helpers import fill
 pytestmark = pytest.mark.needs("gl")
 
 SMALL = {"views": 3, "view_size": (40, 30)}
+KINDS = ({}, {"technique": "mvr"}, {"technique": "mvr", "mvr": "instanced-partitioned-deferred"})
 
 
 @pytest.fixture(scope="module")
@@ -80,27 +81,27 @@ def test_arguments_of_the_wrong_kind_are_named(
         getattr(Renderer(device), method)(**arguments)
 
 
-@pytest.mark.parametrize("technique", ["lfdpr", "mvr"])
+@pytest.mark.parametrize("options", KINDS)
 def test_many_frames_leave_nothing_behind(
-    device: Device, spheres: Scene, display: DisplayProfile, technique: str
+    device: Device, spheres: Scene, display: DisplayProfile, options: dict[str, str]
 ) -> None:
     before = device.ledger.total
     renderer = Renderer(device)
-    renderer.views(spheres, display, technique=technique, **SMALL)
+    renderer.views(spheres, display, **options, **SMALL)
     held, owned = device.ledger.total, len(device.owned)
     for _ in range(5):
-        renderer.views(spheres, display, technique=technique, **SMALL)
+        renderer.views(spheres, display, **options, **SMALL)
     assert (device.ledger.total, len(device.owned)) == (held, owned)
     renderer.close()
     assert device.ledger.total == before
 
 
-@pytest.mark.parametrize("technique", ["lfdpr", "mvr"])
+@pytest.mark.parametrize("options", KINDS)
 def test_a_call_that_fails_anywhere_leaves_nothing_behind(
     device: Device,
     spheres: Scene,
     display: DisplayProfile,
-    technique: str,
+    options: dict[str, str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Every allocation of a call fails once; the planted fault is the failure itself."""
@@ -120,7 +121,7 @@ def test_a_call_that_fails_anywhere_leaves_nothing_behind(
         with monkeypatch.context() as patch:
             patch.setattr(Ledger, "add", add)
             try:
-                renderer.views(spheres, display, technique=technique, **SMALL)
+                renderer.views(spheres, display, **options, **SMALL)
             except ResourceError:
                 failures += 1
             else:
