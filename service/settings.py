@@ -95,6 +95,14 @@ class Settings(BaseModel):
                 f"{PREFIX}{name.upper()}: {first['input']!r}; {first['msg']}"
             ) from error
 
+    @staticmethod
+    def table() -> list[str]:
+        """Rows of a Markdown table of all settings."""
+        return [
+            f"| `{PREFIX}{name.upper()}` | {_plain(about.default)} | {about.description} |"
+            for name, about in Settings.model_fields.items()
+        ]
+
     @property
     def pool(self) -> PoolSettings:
         """Those of the render processes."""
@@ -122,3 +130,7 @@ class Settings(BaseModel):
             nodes=1 << 16,
             drawn_triangles=self.max_triangles,
         )
+
+
+def _plain(default: Any) -> str:
+    return "" if default in (None, ()) else str(default)
