@@ -17,8 +17,10 @@ from lfd_render.engine.pool import Pool
 from lfd_render.errors import GpuError
 from lfd_render.version import __version__
 
-from . import displays, health, jobs, pictures, problems, scenes
+from . import displays, health, jobs, pictures, problems, scenes, streams
+from .clients import Slots
 from .display_store import DisplayStore
+from .ending import tell_of_signals
 from .guards import Bodies, Keys, SameSite
 from .job_store import JobStore
 from .journal import Journal, log_json
@@ -41,7 +43,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     chosen = settings or Settings.from_environment()
     log_json(chosen.log_level)
     pool = Pool(chosen.pool)
-    metrics = Metrics(pool)
+    streaming = Slots(chosen.max_streams)
+    metrics = Metrics(pool, streaming)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -59,7 +62,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                 jobs_made,
                 ByteLru(chosen.answer_cache_mb << 20),
                 metrics,
+                streaming,
             )
+            tell_of_signals(app.state.lfd.ending)
             try:
                 await pool.start()
             except GpuError as error:
@@ -82,7 +87,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.state.failure = None  # why it could not start
     problems.install(app)
-    for part in (health, scenes, pictures, jobs, displays):
+    for part in (health, scenes, pictures, jobs, streams, displays):
         app.include_router(part.router)
     # The last one added is the outermost.
     app.add_middleware(Bodies, settings=chosen)

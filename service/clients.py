@@ -3,12 +3,37 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from starlette.types import Receive
 
+from .problems import ProblemError
+
 T = TypeVar("T")
+
+
+class Slots:
+    """Places for clients that stay."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self.taken = 0
+
+    @contextmanager
+    def slot(self) -> Iterator[None]:
+        """A place. Raises ProblemError 429 when none is free."""
+        if self.taken >= self._most:
+            raise ProblemError(
+                429, f"{self.taken} streams are being sent; ask again in 10 s", None,
+                {"Retry-After": "10"},
+            )  # fmt: skip
+        self.taken += 1
+        try:
+            yield
+        finally:
+            self.taken -= 1
 
 
 class ClientGoneError(Exception):

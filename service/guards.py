@@ -27,8 +27,6 @@ _ANY = ("0.0.0.0", "::")
 _MOST_BUCKETS = 10_000
 _BODY_BYTES = 4 << 20  # of anything but a scene
 _MULTIPART_BYTES = 1 << 20  # what headers of parts may take besides the files
-_BODY_IDLE_S = 30.0
-_SEND_IDLE_S = 30.0
 
 
 async def refuse(scope: Scope, receive: Receive, send: Send, error: ProblemError) -> None:
@@ -155,6 +153,7 @@ class Bodies:
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self._app = app
+        self._idle_s = settings.idle_s
         self._scene_bytes = settings.upload_bytes + _MULTIPART_BYTES
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -177,7 +176,7 @@ class Bodies:
             if whole:
                 return await receive()
             try:
-                async with asyncio.timeout(_BODY_IDLE_S):
+                async with asyncio.timeout(self._idle_s):
                     message = await receive()
             except TimeoutError:
                 raise ProblemError(408, "the body stopped coming; send it again") from None
@@ -189,7 +188,7 @@ class Bodies:
 
         async def patient(message: Message) -> None:
             try:
-                async with asyncio.timeout(_SEND_IDLE_S):
+                async with asyncio.timeout(self._idle_s):
                     await send(message)
             except TimeoutError:
                 raise ClientGoneError from None

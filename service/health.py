@@ -48,10 +48,11 @@ async def livez() -> Alive:
 async def readyz(state: Shared, response: Response) -> Readiness:
     """Ready when at least one render process is; a software renderer is said to be one."""
     pool = state.pool
-    if not pool.accepting:
+    ready = pool.accepting and not state.ending.is_set()
+    if not ready:
         response.status_code = 503
     return Readiness(
-        ready=pool.accepting,
+        ready=ready,
         processes=pool.settings.processes,
         processes_ready=pool.ready,
         renderers=pool.renderers,

@@ -200,7 +200,10 @@ async def delete_job(job: JobId, state: Shared) -> Response:
 async def job_events(job: JobId, state: Shared) -> Response:
     """The job now, and again whenever more of it is done, until it ends."""
     return LiveResponse(
-        _events(state.jobs.get(job)), "text/event-stream", {"Cache-Control": "no-store"}
+        _events(state.jobs.get(job)),
+        "text/event-stream",
+        {"Cache-Control": "no-store"},
+        until=state.ending,
     )
 
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from prometheus_client import CollectorRegistry, Counter, Histogram, generate_latest
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
 if TYPE_CHECKING:
     from lfd_render.engine.pool import Pool
+
+    from .clients import Slots
 
 MEDIA = "text/plain; version=0.0.4; charset=utf-8"
 _SECONDS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60)
@@ -19,8 +21,11 @@ STAGES = ("queue", "load", "upload", "compile", "frame", "read", "look", "map", 
 class Metrics:
     """One registry an application: none is shared by two in one process."""
 
-    def __init__(self, pool: Pool) -> None:
+    def __init__(self, pool: Pool, streams: Slots) -> None:
         self._registry = CollectorRegistry()
+        Gauge("lfd_streams", "Streams being sent.", registry=self._registry).set_function(
+            lambda: streams.taken
+        )
         self._registry.register(_PoolCollector(pool))
         self.requests = Counter(
             "lfd_requests", "Requests answered.", ["route", "method", "status"],

@@ -132,7 +132,7 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(RequestValidationError)
     async def invalid(request: Request, error: RequestValidationError) -> Response:
         first = error.errors()[0]
-        field = "body" if first["type"] == "json_invalid" else _place(first["loc"])
+        field = "body" if first["type"] == "json_invalid" else place(first["loc"])
         return answer(request, 422, f"{field}: {first['msg']}", field)
 
     @app.exception_handler(HTTPException)
@@ -141,7 +141,7 @@ def install(app: FastAPI) -> None:
         return answer(request, error.status_code, str(error.detail), None, headers)
 
 
-def _place(location: tuple[int | str, ...]) -> str:
+def place(location: tuple[int | str, ...]) -> str:
     """The field of a request that a validation names: without where it stands, which picture's
     class it is of, and which of a field's types failed."""
     where, *parts = map(str, location)

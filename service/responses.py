@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncGenerator, Mapping
+from contextlib import aclosing
 
 from fastapi import Response
 from starlette.types import Receive, Scope, Send
@@ -47,26 +49,43 @@ class PiecesResponse(Response):
 
 class LiveResponse(Response):
     """A body that is made while it is sent: the next piece when the client has taken the last one.
-    Its generator is closed when the client goes."""
+    Its generator is closed when the client goes; `until` ends it before."""
 
     def __init__(
-        self, pieces: AsyncGenerator[bytes], media_type: str, headers: Mapping[str, str]
+        self,
+        pieces: AsyncGenerator[bytes],
+        media_type: str,
+        headers: Mapping[str, str],
+        until: asyncio.Event | None = None,
     ) -> None:
         super().__init__(headers=headers, media_type=media_type)
-        self._pieces = pieces
+        self._pieces, self._until = pieces, until or asyncio.Event()
         if "content-length" not in headers:
             del self.headers["content-length"]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """As ASGI has it."""
-        await unless_gone(receive, self._send(send))
+        async with aclosing(self._pieces):
+            await unless_gone(receive, self._send(send))
 
     async def _send(self, send: Send) -> None:
-        start = {"type": "http.response.start", "status": 200, "headers": self.raw_headers}
+        # The first piece before all else: what hinders it still becomes a problem's answer.
+        piece = await anext(self._pieces, None)
+        await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
+        ending = asyncio.create_task(self._until.wait())
         try:
-            await send(start)
-            async for piece in self._pieces:
+            while piece is not None:
                 await send({"type": "http.response.body", "body": piece, "more_body": True})
-            await send({"type": "http.response.body", "body": b""})
+                making = asyncio.create_task(self._next())
+                try:
+                    await asyncio.wait((making, ending), return_when=asyncio.FIRST_COMPLETED)
+                    piece = making.result() if making.done() else None
+                finally:
+                    making.cancel()
+                    await asyncio.wait((making,))
         finally:
-            await self._pieces.aclose()
+            ending.cancel()
+        await send({"type": "http.response.body", "body": b""})
+
+    async def _next(self) -> bytes | None:
+        return await anext(self._pieces, None)

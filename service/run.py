@@ -36,6 +36,7 @@ def run(settings: Settings, say: Callable[[str], None]) -> None:
                 app, log_config=None, access_log=False, server_header=False, lifespan="on",
                 timeout_keep_alive=_KEEP_ALIVE_S,
                 timeout_graceful_shutdown=round(settings.drain_s) + 1,
+                ws_max_size=1 << 16, ws_per_message_deflate=False,
             ),
             lambda: say(f"listening on http://{said}:{port}"),
         )  # fmt: skip
@@ -53,11 +54,15 @@ def run(settings: Settings, say: Callable[[str], None]) -> None:
 def _listening(settings: Settings) -> socket.socket:
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
     try:
-        return socket.create_server((settings.host, settings.port), family=family, backlog=1024)
+        made = socket.create_server((settings.host, settings.port), family=family, backlog=1024)
     except OSError as error:
         raise OutputError(
             f"--port: {settings.host}:{settings.port}: {error.strerror}; choose another"
         ) from error
+    # Connections inherit it. Closing one politely waits for a client to take what was sent; one
+    # that never does would keep it for good.
+    made.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1000 * settings.idle_s))
+    return made
 
 
 class _Server(uvicorn.Server):

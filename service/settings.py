@@ -50,6 +50,9 @@ class Settings(BaseModel):
     grace_s: Seconds = Field(
         5.0, description="Seconds after that until a process which does not stop is ended."
     )
+    idle_s: Seconds = Field(
+        30.0, description="Seconds a client may neither send what it has begun nor take its answer."
+    )
     drain_s: Seconds = Field(30.0, description="Seconds that pictures get when the server ends.")
     process_memory_mb: int = Field(
         8192, ge=0, description="Memory of a render process; one that takes more is ended. 0: any."

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from asyncio import Event
+from dataclasses import dataclass, field
 from typing import Annotated, cast
 
 from fastapi import Depends
@@ -11,6 +12,7 @@ from starlette.requests import HTTPConnection
 from lfd_render.engine.lru import ByteLru
 from lfd_render.engine.pool import Pool
 
+from .clients import Slots
 from .display_store import DisplayStore
 from .job_store import JobStore
 from .metrics import Metrics
@@ -30,6 +32,8 @@ class State:
     jobs: JobStore
     answers: ByteLru[Picture]
     metrics: Metrics
+    streams: Slots
+    ending: Event = field(default_factory=Event)  # the server is told to end
 
 
 def state_of(connection: HTTPConnection) -> State:
