@@ -87,9 +87,9 @@ class StoredJob:
         """Once now and after each change until it has ended; False after so long without one."""
         news = True
         while True:
-            changed = self._changed
+            changed, ended = self._changed, self.finished is not None
             yield news
-            if self.finished is not None:
+            if ended:
                 return
             try:
                 async with asyncio.timeout(idle_s):
