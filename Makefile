@@ -40,7 +40,7 @@ system:
 	@./bootstrap.sh system gl venv
 
 system-test:
-	@./bootstrap.sh system gl venv zink?
+	@./bootstrap.sh system gl venv zink? browser?
 
 # Linting needs no GL, so an environment asks for its own system package alone.
 $(VENV)/base.stamp: pyproject.toml

@@ -17,7 +17,7 @@ from lfd_render.engine.pool import Pool
 from lfd_render.errors import GpuError
 from lfd_render.version import __version__
 
-from . import displays, health, jobs, pictures, problems, scenes, streams
+from . import calibration, displays, health, jobs, page, pictures, problems, scenes, streams
 from .clients import Slots
 from .display_store import DisplayStore
 from .ending import tell_of_signals
@@ -87,7 +87,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.state.failure = None  # why it could not start
     problems.install(app)
-    for part in (health, scenes, pictures, jobs, streams, displays):
+    for part in (health, scenes, pictures, jobs, streams, displays, calibration, page):
         app.include_router(part.router)
     # The last one added is the outermost.
     app.add_middleware(Bodies, settings=chosen)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 from lfd_render.display import DisplayProfile
 from lfd_render.display.profile import AUTO, shipped_profiles
@@ -33,6 +35,10 @@ class DisplayStore:
             raise ProblemError(
                 404, f"display '{name}': unknown; /v1/displays lists those there are", "display"
             ) from None
+
+    def told(self, given: str | dict[str, Any]) -> DisplayProfile:
+        """The profile of a name, or the one spelt out. Raises ProblemError 404, ProfileError."""
+        return self.get(given) if isinstance(given, str) else inline(json.dumps(given))
 
     def put(self, name: str, text: str) -> tuple[DisplayProfile, bool]:
         """Keep the profile of a text under a name; whether the name is new.

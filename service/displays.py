@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request, Response
@@ -18,7 +17,7 @@ from lfd_render.engine.choices import Choices
 from lfd_render.engine.jobs import Job, ViewMap
 
 from .answers import answer
-from .display_store import inline, is_shipped
+from .display_store import is_shipped
 from .fields import DisplayName, Fields
 from .jobs import LATER
 from .media import choose
@@ -160,8 +159,7 @@ async def delete_display(name: Name, state: Shared) -> Response:
 @router.post("/convert-display", summary="Convert a profile", responses=responses())
 async def convert_display(body: ConvertBody, state: Shared) -> Converted:
     """A profile in the words of another system, and what these cannot say."""
-    given = body.display
-    display = state.displays.get(given) if isinstance(given, str) else inline(json.dumps(given))
+    display = state.displays.told(body.display)
     made = await run_in_threadpool(convert, display, body.to)
     lost = [Lost(field=part.field, was=part.was, became=part.became) for part in made.lost]
     return Converted(text=made.text, lost=lost)

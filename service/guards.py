@@ -18,6 +18,7 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from .clients import ClientGoneError
+from .page import is_page
 from .problems import ProblemError, problem
 from .settings import Settings
 
@@ -100,7 +101,7 @@ class Keys:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """As ASGI has it."""
-        if scope["type"] in ("http", "websocket") and scope["path"] not in PROBES:
+        if scope["type"] in ("http", "websocket") and not _is_open(scope["path"]):
             try:
                 self._take(self._who(scope))
             except ProblemError as error:
@@ -194,6 +195,11 @@ class Bodies:
                 raise ClientGoneError from None
 
         await self._app(scope, counted, patient)
+
+
+def _is_open(path: str) -> bool:
+    """Whether no key is asked for: probes have none, and the page asks people for theirs."""
+    return path in PROBES or is_page(path)
 
 
 def _too_large(most: int) -> ProblemError:

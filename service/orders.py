@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
@@ -11,7 +10,6 @@ from lfd_render.engine import encoding
 from lfd_render.engine.jobs import AllViews, Job, PanelImage, SceneSource
 from lfd_render.engine.plans import check_plan
 
-from .display_store import inline
 from .fields import AnyBody, AnyQuery, EiaFields, Views
 from .media import choose
 from .state import State
@@ -39,8 +37,8 @@ def of_body(
     state: State, body: AnyBody, accept: str | None, *, later: bool = False
 ) -> Iterator[Job]:
     """The job of a JSON body, as `of_query` has it."""
-    given, camera = body.display, body.camera
-    display = inline(json.dumps(given)) if isinstance(given, dict) else state.displays.get(given)
+    camera = body.camera
+    display = state.displays.told(body.display)
     window = Camera.from_json_dict(camera) if isinstance(camera, dict) else camera
     with state.scenes.source(body.scene) as source:
         yield _job(state, body, accept, later, source=source, display=display, camera=window)

@@ -10,6 +10,7 @@ from lfd_render.engine.jobs import (
     Job,
     OneView,
     PanelImage,
+    Pattern,
     Product,
     QuiltPicture,
     Result,
@@ -24,7 +25,7 @@ _SUFFIXES = {
 }  # fmt: skip
 _NAMES: dict[type[Product], str] = {
     PanelImage: "eia", Seen: "look", OneView: "view", AllViews: "views", QuiltPicture: "quilt",
-    SceneFacts: "scene", ViewMap: "map",
+    SceneFacts: "scene", ViewMap: "map", Pattern: "pattern",
 }  # fmt: skip
 
 

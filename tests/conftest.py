@@ -6,7 +6,6 @@ full counts of the acceptance lines (``make verify``).
 
 import importlib.util
 import os
-import shutil
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -36,10 +35,6 @@ def _zink_problem() -> str | None:
     return None if system.lavapipe_icd() else "lavapipe (mesa-vulkan-drivers) is not installed"
 
 
-def _browser_problem() -> str | None:
-    return None if shutil.which("chromium") else "chromium is not installed"
-
-
 def _ray_problem() -> str | None:
     return None if importlib.util.find_spec("ray") else "ray is not installed (extra [ray])"
 
@@ -47,7 +42,7 @@ def _ray_problem() -> str | None:
 PROBLEMS: dict[str, Callable[[], str | None]] = {
     "gl": system.gl_problem,
     "zink": _zink_problem,
-    "browser": _browser_problem,
+    "browser": system.browser_problem,
     "ray": _ray_problem,
 }
 

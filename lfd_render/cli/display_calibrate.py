@@ -82,6 +82,7 @@ def calibrate(
         raise UsageError("-: the guide needs files; give a .json and a .png")
 
     from lfd_render.display import DisplayProfile  # noqa: PLC0415 (keeps --help quick)
+    from lfd_render.display.calibration import by_eye  # noqa: PLC0415
 
     profile = DisplayProfile.load(display)
     say(f"Show {pattern} on the display, full-screen, pixel for pixel. {HELP}.")
@@ -102,7 +103,7 @@ def calibrate(
                 raise UsageError("ended before the last step; nothing is written")
             case _:
                 profile = _answered(profile, now.field, answer)
-    _finished(profile, name).save(Path(output))
+    by_eye.finished(profile, name).save(Path(output))
     say(
         f"{output}: {profile.lens_count:.4f} lenses, tilt {math.degrees(profile.tilt_rad):.4f}°, "
         f"center {profile.center:.5f}; 'display fit' makes it exact"
@@ -142,6 +143,8 @@ def _value(profile: DisplayProfile, field: str) -> float:
 
 def _answered(profile: DisplayProfile, field: str, answer: str) -> DisplayProfile:
     """The profile with a changed number; as it was, and a line saying why, where it cannot be."""
+    from lfd_render.display.calibration.by_eye import adjusted  # noqa: PLC0415 (keeps --help quick)
+
     sign = answer[0]
     try:
         number = float(answer.removeprefix("="))
@@ -152,50 +155,7 @@ def _answered(profile: DisplayProfile, field: str, answer: str) -> DisplayProfil
         return profile
     value = number if sign == "=" else _value(profile, field) + number
     try:
-        return _with(profile, field, value)
+        return adjusted(profile, field, value)
     except LfdError as problem:
         say(f"{problem}")
         return profile
-
-
-def _with(profile: DisplayProfile, field: str, value: float) -> DisplayProfile:
-    """The profile with another number, of the same phase at the panel's middle unless it is the
-    center that changes. Raises ProfileError."""
-    from lfd_render.display import DisplayProfile  # noqa: PLC0415 (keeps --help quick)
-
-    lens = profile.lens
-    count, drift, center = lens.lens_count, lens.drift, lens.center
-    middle = count * (1 + drift) / 2 - center
-    if field == "center":
-        center = value
-    else:
-        width, height = profile.size_mm
-        if field == "lens_count":
-            count = value
-        else:
-            drift = height / width * math.tan(math.radians(value))
-        center = count * (1 + drift) / 2 - middle
-        center -= round(center - lens.center)
-    changed = lens.model_copy(update={"lens_count": count, "drift": drift, "center": center})
-    # Through its text, so that whatever is out of range is said as for any profile.
-    text = profile.model_copy(update={"lens": changed}).to_json()
-    return DisplayProfile.from_json(text, source=f"{field} {value:g}")
-
-
-def _finished(profile: DisplayProfile, name: str | None) -> DisplayProfile:
-    """The profile as this unit's own, with what was adjusted no longer assumed."""
-    provenance = profile.provenance
-    adjusted = ("lens.lens_count", "lens.drift", "lens.tilt", "lens.center")
-    assumed = tuple(a for a in provenance.assumed if not a.startswith(adjusted))
-    return profile.model_copy(
-        update={
-            "name": name or f"{profile.name}-by-eye",
-            "provenance": provenance.model_copy(
-                update={
-                    "source": f"adjusted by eye from {profile.name}"[:2000],
-                    "template": False,
-                    "assumed": assumed,
-                }
-            ),
-        }
-    )

@@ -79,13 +79,28 @@ class ViewMap:
     """Which view each subpixel of a panel shows."""
 
 
-Product = PanelImage | Seen | OneView | AllViews | QuiltPicture | SceneFacts | ViewMap
+@dataclass(frozen=True)
+class Pattern:
+    """A test pattern of display.patterns for a panel. view, width, colour: those of a grating.
+    through: the panel before which an eye sees it, by default at its viewing distance, in a picture
+    of a size; else the panel's own pixels are made."""
+
+    kind: str
+    view: int | None = None
+    width: int | None = None
+    colour: str | None = None
+    through: DisplayProfile | None = None
+    eye: tuple[float, float, float] | None = None
+    size: tuple[int, int] | None = None
+
+
+Product = PanelImage | Seen | OneView | AllViews | QuiltPicture | SceneFacts | ViewMap | Pattern
 
 
 @dataclass(frozen=True)
 class Job:
-    """One thing to make. media: the media type to encode it in; scene is None for view maps,
-    display for scene facts."""
+    """One thing to make. media: the media type to encode it in; scene is None for view maps
+    and patterns, display for scene facts."""
 
     product: Product
     media: str

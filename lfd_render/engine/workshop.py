@@ -20,6 +20,7 @@ from lfd_render.engine.jobs import (
     Job,
     OneView,
     PanelImage,
+    Pattern,
     QuiltPicture,
     Result,
     SceneFacts,
@@ -28,6 +29,7 @@ from lfd_render.engine.jobs import (
     ViewMap,
 )
 from lfd_render.engine.lru import ByteLru
+from lfd_render.engine.patterns import pattern_picture
 from lfd_render.engine.quilts import chosen_size
 from lfd_render.errors import OptionError, UsageError
 from lfd_render.panel.eia import Eia
@@ -89,6 +91,8 @@ class Workshop:
                 result = self._facts(job, spans)
             case ViewMap():
                 result = _view_map(job, spans)
+            case Pattern():
+                result = _pattern(job, job.product, spans)
         return result
 
     def _scene(self, job: Job, spans: Spans) -> Scene:
@@ -316,6 +320,14 @@ def _view_map(job: Job, spans: Spans) -> Result:
         npy = job.media == encoding.NPY
         body = encoding.npy(index) if npy else encoding.encoded(pixels, job.media)
     return _result(job, body, pixels, {"views": views}, spans)
+
+
+def _pattern(job: Job, pattern: Pattern, spans: Spans) -> Result:
+    with spans.span("map"):
+        picture = pattern_picture(_display(job), pattern)
+    with spans.span("encode"):
+        body = encoding.encoded(picture, job.media)
+    return _result(job, body, picture, {}, spans)
 
 
 def scene_bytes(scene: Scene) -> int:

@@ -1,4 +1,5 @@
-"""What the operating system must provide: EGL with a driver, lavapipe for the 64-bit tests, venv.
+"""What the operating system must provide: EGL with a driver, venv, and for tests lavapipe, whose
+atomics have 64 bits, and Chromium.
 
 Standard library only and nothing from the package, because `make` runs this file with the bare
 system Python before the virtual environment exists: `python3 system.py gl venv zink?` installs what
@@ -21,6 +22,7 @@ from typing import Any
 
 GL_PACKAGES = ("libegl1", "libgl1", "libgl1-mesa-dri")
 ZINK_PACKAGES = ("mesa-vulkan-drivers",)
+BROWSER_PACKAGES = ("chromium",)
 # Debian splits ensurepip off into a package for each Python version.
 VENV_PACKAGES = (f"python{sys.version_info[0]}.{sys.version_info[1]}-venv",)
 
@@ -153,10 +155,16 @@ def _zink_problem() -> str | None:
     return None if lavapipe_icd() else "lavapipe, Mesa's software Vulkan, is not installed"
 
 
+def browser_problem() -> str | None:
+    """Why the page cannot be tried here, or None when it can."""
+    return None if shutil.which("chromium") else "chromium is not installed"
+
+
 PARTS = {
     "gl": (gl_problem, GL_PACKAGES),
     "venv": (_venv_problem, VENV_PACKAGES),
     "zink": (_zink_problem, ZINK_PACKAGES),
+    "browser": (browser_problem, BROWSER_PACKAGES),
 }
 
 
@@ -203,12 +211,20 @@ def main(requests: Sequence[str]) -> int:
     missing = _missing(requests)
     privilege = _privilege() if missing else None
     if privilege is not None:
-        packages = _packages(missing)
-        print(f"Installing system packages: {' '.join(packages)}", file=sys.stderr, flush=True)
-        if _install(packages, privilege):
+        # Each wanted part by itself: one that this system lacks must not keep the rest away.
+        needed = [part for part in missing if part in requests]
+        groups = [needed, *([part] for part in missing if part not in requests)]
+        done = [_provide(group, privilege) for group in groups if group]
+        if any(done):
             # A fresh process, because this one's loader remembers which libraries were missing.
             return int(not _run([sys.executable, __file__, "--check", *requests], errors=True))
     return _report(missing, requests)
+
+
+def _provide(parts: Sequence[str], privilege: Sequence[str]) -> bool:
+    packages = _packages(parts)
+    print(f"Installing system packages: {' '.join(packages)}", file=sys.stderr, flush=True)
+    return _install(packages, privilege)
 
 
 def _missing(requests: Sequence[str]) -> dict[str, str]:

@@ -20,6 +20,7 @@ def bare(monkeypatch: pytest.MonkeyPatch) -> None:
         "gl": (lambda: "libGL.so.1: no such file", system.GL_PACKAGES),
         "venv": (lambda: None, system.VENV_PACKAGES),
         "zink": (lambda: "no lavapipe", system.ZINK_PACKAGES),
+        "browser": (lambda: "no chromium", system.BROWSER_PACKAGES),
     }
     monkeypatch.setattr(system, "PARTS", parts)
     monkeypatch.setattr(system, "_privilege", lambda: None)
@@ -74,6 +75,22 @@ def test_it_installs_where_permitted(
     succeeded = "check" in expected
     assert (system.main(["gl", "venv"]) == 0) == succeeded
     assert done == expected
+
+
+@pytest.mark.usefixtures("bare")
+def test_a_wanted_part_that_cannot_be_had_keeps_none_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    installed: list[str] = []
+
+    def run(command: Sequence[str], errors: bool = False) -> bool:
+        if "install" in command and system.BROWSER_PACKAGES[0] in command:
+            return False
+        installed.extend(package for package in system.GL_PACKAGES if package in command)
+        return True
+
+    monkeypatch.setattr(system, "_privilege", lambda: [])
+    monkeypatch.setattr(system, "_run", run)
+    assert system.main(["gl", "zink?", "browser?"]) == 0
+    assert installed == list(system.GL_PACKAGES)
 
 
 def bootstrap(*arguments: str, python: str) -> subprocess.CompletedProcess[str]:
