@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from fastapi import Request, Response
 
 from lfd_render.engine.jobs import Job, Result
@@ -45,9 +47,17 @@ def _bare(headers: dict[str, str]) -> Response:
 
 async def racing(request: Request, state: State, job: Job) -> Result:
     """The job's result, or ClientGoneError as soon as the client goes."""
-    result = await unless_gone(request.receive, state.pool.run(job))
+    work = state.pool.run(job, deadline_s=_patience_s(request, state.settings.deadline_s))
+    result = await unless_gone(request.receive, work)
     state.metrics.observe(result.timings_ms)
     return result
+
+
+def _patience_s(request: Request, most: float) -> float:
+    """How long a request may take: as long as the server lets it, or the client would wait by
+    ``Prefer: wait`` (RFC 7240, section 4.3)."""
+    said = re.search(r"\bwait=(\d{1,6})\b", ",".join(request.headers.getlist("prefer")).lower())
+    return min(most, float(said[1])) if said else most
 
 
 def server_timing(timings_ms: dict[str, float]) -> str:

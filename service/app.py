@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI
@@ -14,17 +12,19 @@ from starlette.middleware.cors import CORSMiddleware
 
 from lfd_render.engine.lru import ByteLru
 from lfd_render.engine.pool import Pool
-from lfd_render.errors import GpuError
+from lfd_render.errors import LfdError
 from lfd_render.version import __version__
 
 from . import calibration, displays, health, jobs, page, pictures, problems, scenes, streams
 from .clients import Slots
+from .data_folder import data_folder
 from .display_store import DisplayStore
 from .ending import tell_of_signals
 from .guards import Bodies, Keys, SameSite
 from .job_store import JobStore
 from .journal import Journal, log_json
 from .metrics import Metrics
+from .picture import Picture
 from .scene_store import SceneStore
 from .settings import Settings
 from .state import State
@@ -48,35 +48,14 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        with tempfile.TemporaryDirectory(prefix="lfd-render-") as temporary:
-            folder = Path(chosen.data_dir or temporary)
-            stored = SceneStore(
-                folder / "scenes", chosen.limits, chosen.max_scenes, chosen.upload_bytes
-            )
-            jobs_made = JobStore(folder / "jobs", chosen, pool, stored)
-            app.state.lfd = State(
-                chosen,
-                pool,
-                stored,
-                DisplayStore(folder / "displays", chosen.max_displays),
-                jobs_made,
-                ByteLru(chosen.answer_cache_mb << 20),
-                metrics,
-                streaming,
-            )
-            tell_of_signals(app.state.lfd.ending)
-            try:
-                await pool.start()
-            except GpuError as error:
-                app.state.failure = error
-                raise
-            app.openapi()  # made once: it takes a third of a second, during which nobody is served
-            try:
+        try:
+            async with _running(chosen, pool, metrics, streaming) as app.state.lfd:
+                tell_of_signals(app.state.lfd.ending)
+                app.openapi()  # made once: for a third of a second nobody is served
                 yield
-            finally:
-                await jobs_made.close()
-                await pool.drain(chosen.drain_s)
-                await pool.close()
+        except LfdError as error:
+            app.state.failure = error
+            raise
 
     app = FastAPI(
         title="lfd_render",
@@ -104,6 +83,27 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(Journal, metrics=metrics)
     vars(app)["openapi"] = lambda: _openapi(app)  # as FastAPI would have it
     return app
+
+
+@asynccontextmanager
+async def _running(
+    settings: Settings, pool: Pool, metrics: Metrics, streaming: Slots
+) -> AsyncIterator[State]:
+    """What handlers share, from the first render process to the last. Raises LfdError."""
+    with data_folder(settings.data_dir) as folder:
+        stored = SceneStore(
+            folder / "scenes", settings.limits, settings.max_scenes, settings.upload_bytes
+        )
+        jobs_made = JobStore(folder / "jobs", settings, pool, stored)
+        kept = DisplayStore(folder / "displays", settings.max_displays)
+        answers: ByteLru[Picture] = ByteLru(settings.answer_cache_mb << 20)
+        await pool.start()
+        try:
+            yield State(settings, pool, stored, kept, jobs_made, answers, metrics, streaming)
+        finally:
+            await jobs_made.close()
+            await pool.drain(settings.drain_s)
+            await pool.close()
 
 
 def _openapi(app: FastAPI) -> dict[str, Any]:

@@ -20,8 +20,8 @@ _KEEP_ALIVE_S = 30
 def run(settings: Settings, say: Callable[[str], None]) -> None:
     """Serve until told to end. `say` hears the address, once it listens.
 
-    Raises UsageError for an address that others can reach without keys, OutputError for one that
-    cannot be had, GpuError when no render process starts.
+    Raises UsageError for an address that others can reach without keys, OutputError for one
+    or a folder that cannot be had, GpuError when no render process starts.
     """
     if not settings.api_keys and not is_loopback(settings.host):
         raise UsageError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -76,7 +76,9 @@ class Settings(BaseModel):
     max_view_pixels: Whole = Field(
         1 << 28, description="Pixels of all views of a picture together, times samples a pixel."
     )
-    log_level: str = Field("info", description="Least level that is logged: debug, info, warning.")
+    log_level: Literal["debug", "info", "warning", "error"] = Field(
+        "info", description="Least level that is logged: debug, info, warning or error."
+    )
 
     @staticmethod
     def from_environment(environment: Mapping[str, str] = os.environ, **given: Any) -> Settings:

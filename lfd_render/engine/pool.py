@@ -34,6 +34,7 @@ _MOST_DEATHS = 2  # of processes at a scene, before it is refused
 _MOST_KILLS = 4  # of processes at a job by others, before it is given up
 _PATIENCE_S = 1.0  # how long the first in the queue lets others go where their scene is warm
 _QUIET_S = 2.0  # nobody asks for so long before the only process turns to the background
+_MOST_WAIT_S = 60.0  # between later ones
 _MOST_FAILED_STARTS = 3  # in a row, until which a new process is tried at once
 
 
@@ -342,7 +343,8 @@ class Pool:
         if self._failed_starts < _MOST_FAILED_STARTS:
             self._spawn()
         else:
-            asyncio.get_running_loop().call_later(2.0**self._failed_starts / 4, self._spawn_later)
+            wait_s = min(2.0**self._failed_starts / 4, _MOST_WAIT_S)
+            asyncio.get_running_loop().call_later(wait_s, self._spawn_later)
         if ticket is not None:
             self._mourn(process, ticket)
         self._changed.set()
@@ -365,7 +367,9 @@ class Pool:
         innocent = process.returncode == -signal.SIGKILL and not process.condemned
         if scene and not innocent:
             self._deaths[scene.id] += 1
-        if scene and (self._deaths[scene.id] >= _MOST_DEATHS or ticket.kills >= _MOST_KILLS):
+        if scene is None and ticket.kills >= _MOST_DEATHS:
+            self._fail(ticket, InternalError(f"{ticket.kills} processes ended over it"))
+        elif scene and (self._deaths[scene.id] >= _MOST_DEATHS or ticket.kills >= _MOST_KILLS):
             self._deaths[scene.id] = max(self._deaths[scene.id], _MOST_DEATHS)
             self._fail(
                 ticket,

@@ -3,18 +3,22 @@
 import io
 import json
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import httpx
 import numpy as np
 import pytest
+from lfd_render.service.fields import EiaQuery, ViewsQuery
 from PIL import Image
 
 from lfd_render import DisplayProfile, Renderer, Scene, look
+from lfd_render.cli.bundle import PANEL_IMAGE
+from lfd_render.engine.choices import Choices
 from lfd_render.renderer import camera_for
 
-from .conftest import PATH, SCENE
+from .conftest import PATH, SCENE, Server
 
 pytestmark = pytest.mark.needs("gl")
 
@@ -111,3 +115,50 @@ def test_unchanged_pictures_are_not_sent_again(client: httpx.Client, small: str)
     assert head.headers["etag"] == first.headers["etag"]
     other = client.get(f"{url}&yaw=1", headers={"If-None-Match": first.headers["etag"]})
     assert other.status_code == 200
+
+
+@pytest.mark.shows("two clients with different displays on one scene get right pictures")
+def test_two_clients_with_two_displays(
+    server: Server, client: httpx.Client, small: str, profile: dict[str, Any], device: Any,
+    scene: Scene,
+) -> None:  # fmt: skip
+    other = json.loads(json.dumps(profile))
+    other["lens"] |= {"lens_count": 31.7, "drift": 0.1}
+    other["viewing"]["views"] = 5
+    client.put("/v1/displays/other", json=other).raise_for_status()
+    asked = [(name, yaw) for yaw in range(8) for name in (small, "other")]
+
+    def one(name: str, yaw: int) -> bytes:
+        with server.client() as own:
+            query = {"display": name, "yaw": yaw}
+            return own.get(f"{PATH}/eia", params=query).raise_for_status().content
+
+    with ThreadPoolExecutor(4) as threads:
+        found = list(threads.map(lambda each: one(*each), asked))
+    displays = {n: DisplayProfile.from_json(json.dumps(p)) for n, p in
+                ((small, profile), ("other", other))}  # fmt: skip
+    assert len(set(found)) == len(asked)
+    renderer = Renderer(device)
+    for (name, yaw), picture in zip(asked, found, strict=True):
+        display = displays[name]
+        camera = camera_for(scene, display).turned(np.deg2rad(yaw))
+        expected = renderer.render(scene, display, camera)
+        assert np.array_equal(np.array(Image.open(io.BytesIO(picture))), expected.pixels)
+
+
+def test_a_helmet_goes_through(client: httpx.Client, small: str, assets: Path) -> None:
+    paths = sorted((assets / "FlightHelmet").iterdir())
+    files = [("files", (path.name, path.read_bytes())) for path in paths]
+    made = client.post("/v1/scenes", files=files)
+    assert made.status_code == 201
+    assert made.json()["triangles"] == 94722
+    seen = pixels(client.get(f"{made.headers['location']}/look", params={"display": small}))
+    assert seen.std() > 20
+
+
+def test_options_have_one_list() -> None:
+    chosen = set(Choices.__dataclass_fields__)
+    assert set(PANEL_IMAGE) == chosen
+    of_http = set(EiaQuery.model_fields) - {"display", "lossy"}
+    assert of_http == chosen
+    assert chosen - {"lookup", "weave", "aa", "aa_light", "splat"} <= set(ViewsQuery.model_fields)

@@ -7,7 +7,6 @@ import subprocess
 import sys
 import zlib
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import httpx
@@ -300,7 +299,11 @@ def test_settings_are_checked(name: str, value: str) -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
-    [(("--host", "0.0.0.0"), 2, "LFD_API_KEYS"), (("--device", "99"), 5, "EGL device 99")],
+    [
+        (("--host", "0.0.0.0"), 2, "LFD_API_KEYS"),
+        (("--data-dir", "/proc/nowhere"), 8, "LFD_DATA_DIR: /proc/nowhere"),
+        (("--device", "99"), 5, "EGL device 99"),
+    ],
 )
 def test_a_server_that_cannot_start_says_why(
     arguments: tuple[str, ...], code: int, words: str
@@ -322,15 +325,3 @@ def test_what_is_described_is_there(client: httpx.Client) -> None:
             assert list(refused) == ["application/problem+json"]
     picture = described["paths"]["/v1/scenes/{scene}/eia"]["get"]
     assert "image/png" in picture["responses"]["200"]["content"]
-
-
-def test_a_helmet_goes_through(assets: Path, start: Start) -> None:
-    with start() as server, server.client() as client:
-        client.put("/v1/displays/small", json=PROFILE).raise_for_status()
-        paths = sorted((assets / "FlightHelmet").iterdir())
-        files = [("files", (path.name, path.read_bytes())) for path in paths]
-        made = client.post("/v1/scenes", files=files)
-        assert made.status_code == 201
-        assert made.json()["triangles"] == 94722
-        found = client.get(f"/v1/scenes/{made.json()['id']}/look?display=small")
-        assert found.status_code == 200

@@ -47,6 +47,16 @@ def test_camera_is_a_rotation_times_a_scale() -> None:
     assert np.linalg.det(linear) == pytest.approx(1)
 
 
+def test_pitch_brings_the_upper_side_forward_after_yaw() -> None:
+    camera = Camera((0, 0, 0), (0, 0, 1), (0, 1, 0), 2.0, yaw_rad=math.pi / 2)
+    turned = camera.turned(0.0, math.pi / 2)
+    moved = turned.display_from_world((20.0, 20.0))[:3, :3]
+    assert moved @ (0, 1, 0) == pytest.approx([0, 0, 10], abs=1e-12)
+    # What yaw has brought forward goes down.
+    assert moved @ (1, 0, 0) == pytest.approx([0, -10, 0], abs=1e-12)
+    assert Camera.from_json_dict(turned.to_json_dict()) == turned
+
+
 def test_yaw_brings_the_right_hand_side_forward() -> None:
     camera = Camera.from_json_dict(FRONT).turned(math.radians(30))
     (right,) = to_display(camera, (1, 0, 0))
