@@ -19,7 +19,6 @@ from .faults.sitecustomize import BREAK, CRASH, EAT, HANG, SLOW
 
 pytestmark = pytest.mark.needs("gl")
 FAULTS = Path(__file__).parent / "faults"
-DEADLINE_S = 4
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +26,6 @@ def server(start: Start, tmp_path_factory: pytest.TempPathFactory) -> Iterator[S
     """One whose render processes fail on demand."""
     folder = tmp_path_factory.mktemp("data")
     settings = {
-        "deadline_s": DEADLINE_S,
         "grace_s": 1,
         "process_memory_mb": 2048,
         "data_dir": folder,
@@ -125,7 +123,9 @@ def test_a_scene_that_crashes_is_refused(client: httpx.Client) -> None:
 def test_a_scene_that_hangs_meets_its_deadline(client: httpx.Client) -> None:
     before = metric(client, "lfd_process_restarts_total")
     with ThreadPoolExecutor() as threads:
-        late = threads.submit(eia, client, scene(3), seed=HANG)
+        query = {"display": "small", "seed": HANG}
+        hurry = {"Prefer": "wait=2"}
+        late = threads.submit(client.get, f"{scene(3)}/eia", params=query, headers=hurry)
         assert eia(client, scene(4), yaw=1).status_code == 200
         problem(late.result(), 504)
     # It is ended after a while, and another takes its place.
