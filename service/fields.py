@@ -37,6 +37,7 @@ from lfd_render.passes.sampling import (
 )
 from lfd_render.passes.view_buffers import WINNERS
 from lfd_render.renderer.options import ENVIRONMENTS, PRESETS, TECHNIQUES
+from lfd_render.techniques.mvr import VARIANTS
 
 DEFAULT_DISPLAY = "gavane-2024-tilted-4k"
 
@@ -69,6 +70,7 @@ class OneOf:
 
 
 Technique = Annotated[str, OneOf(TECHNIQUES)]
+Variant = Annotated[str, OneOf(VARIANTS)]
 Preset = Annotated[str, OneOf(PRESETS)]
 Lod = Annotated[str, OneOf(LOD_RULES)]
 Lattice = Annotated[str, OneOf(LATTICES)]
@@ -108,9 +110,7 @@ class Views(Placed):
     """How views are rendered."""
 
     technique: Technique = Field("lfdpr", description="Rendering technique.")
-    mvr: Annotated[str, Field(max_length=60)] = Field(
-        "multipass", description="Variant of technique mvr.", examples=["loop-4-deferred"]
-    )
+    mvr: Variant = Field("multipass", description="Variant of technique mvr.")
     preset: Preset = Field(
         "default", description="Choices of the technique: ours, the paper's, or slow and finest."
     )

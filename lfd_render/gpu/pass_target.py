@@ -59,8 +59,8 @@ class PassTarget(Owned):
         status = raw.glCheckNamedFramebufferStatus(self._name, gl.FRAMEBUFFER)
         if status != gl.FRAMEBUFFER_COMPLETE:
             raise GpuError(
-                f"framebuffer of {depth.count} views: {device.name} calls it incomplete "
-                f"({status:#x}); use technique 'mvr' with mvr 'multipass'"
+                f"framebuffer of {depth.count} layers: {device.name} calls it incomplete "
+                f"({status:#x}); use mvr 'multipass'"
             )
 
     def _attach_layer(self, point: int, layers: Layers) -> None:

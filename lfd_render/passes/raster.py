@@ -19,11 +19,6 @@ from lfd_render.passes.placement import Placement, gl_matrix
 from lfd_render.passes.raster_views import band_views
 from lfd_render.passes.view_target import ViewTarget
 
-_VERTEX = {
-    "multipass": "raster/each.vert",
-    "instanced": "raster/layered.vert",
-    "multiview": "raster/multiview.vert",
-}
 _GEOMETRY = {"loop": "raster/loop.geom", "invocations": "raster/invocations.geom"}
 SOLID = ("opaque", "mask")
 BLENDED = ("blend",)
@@ -105,12 +100,14 @@ class Raster:
         self, fragment: str, alpha_mode: str, constants: Mapping[str, int]
     ) -> RasterProgram:
         pipeline = self.pipeline
-        vertex = _VERTEX.get(pipeline.amplification, "raster/corners.vert")
-        if pipeline.partitioned and not pipeline.geometry:
-            vertex = _VERTEX["multipass"]
+        vertex = "each"
+        if pipeline.geometry:
+            vertex = "corners"
+        elif pipeline.layered:
+            vertex = "multiview" if pipeline.amplification == "multiview" else "layered"
         return RasterProgram(
             self._device,
-            vertex,
+            f"raster/{vertex}.vert",
             fragment,
             {
                 "ALPHA_TESTED": int(alpha_mode != "opaque"),
