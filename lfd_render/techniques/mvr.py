@@ -45,7 +45,10 @@ def is_deferred(variant: str) -> bool:
 
 
 def problem(device: Device, variant: str, views: int) -> str | None:
-    """Why a device cannot render so many views by a variant, and what would do; None if it can."""
+    """Why a device cannot render so many views by a variant, and what would do; None if it can.
+
+    Scenes with masked or blended materials may ask more of a loop that draws ids; `make_mvr` says.
+    """
     components = BARE if is_deferred(variant) else SHADED
     return pipeline_of(variant).problem(device, views, components=components)
 
