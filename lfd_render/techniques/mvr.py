@@ -22,7 +22,7 @@ from lfd_render.techniques.base import Effort
 
 _DEFERRED = "-deferred"
 VARIANTS = (*PIPELINES, *(name + _DEFERRED for name in PIPELINES))
-DEFAULT_VARIANT = "multipass"  # which shares no code with points, and so is the tests' other eye
+DEFAULT_VARIANT = "multipass"  # shares no pass with points, so tests look with it
 
 
 def pipeline_of(variant: str) -> Pipeline:
