@@ -155,9 +155,15 @@ def _zink_problem() -> str | None:
     return None if lavapipe_icd() else "lavapipe, Mesa's software Vulkan, is not installed"
 
 
+def browser_path() -> str | None:
+    """Chromium's program, which Debian calls chromium and others otherwise."""
+    names = ("chromium", "chromium-browser", "google-chrome-stable")
+    return next((path for name in names if (path := shutil.which(name))), None)
+
+
 def browser_problem() -> str | None:
     """Why the page cannot be tried here, or None when it can."""
-    return None if shutil.which("chromium") else "chromium is not installed"
+    return None if browser_path() else "chromium is not installed"
 
 
 PARTS = {

@@ -45,6 +45,7 @@ export class Displays {
   #name = document.querySelector("#display-name");
   #summaries = [];
   #typing;
+  #typed = new Set(); // inputs whose numbers the profile is yet to take
   #changed;
 
   name = null; // null: the profile has none, and is sent whole
@@ -164,7 +165,7 @@ export class Displays {
     this.#tell();
     if (this.#text && !typed) this.#text.value = JSON.stringify(profile, null, 2);
     for (const input of this.#editor?.querySelectorAll("input") ?? []) {
-      if (input === document.activeElement) continue;
+      if (input === document.activeElement || this.#typed.has(input)) continue;
       const value = input.name === "lens.tilt_deg" ? tiltDeg(profile) : at(profile, input.name);
       input.value = Number(Number(value).toPrecision(10));
     }
@@ -193,21 +194,26 @@ export class Displays {
     const made = document.createElement("label");
     const input = document.createElement("input");
     Object.assign(input, { type: "number", step: "any", name: path, required: true });
-    input.addEventListener("input", () => this.#soon(() => this.#write(path, input)));
+    input.addEventListener("input", () => {
+      this.#typed.add(input);
+      this.#soon(() => this.#write());
+    });
     const named = document.createElement("span");
     named.textContent = unit ? `${label} (${unit})` : label;
     made.append(named, input);
     return made;
   }
 
-  /** Take a field's number over into the profile. */
-  #write(path, input) {
-    if (!input.checkValidity()) {
-      throw new Problem({ detail: "give a number", field: path });
-    }
+  /** Take the numbers that were typed over into the profile. */
+  #write() {
     const profile = structuredClone(this.profile);
-    if (path === "lens.tilt_deg") delete profile.lens.drift;
-    put(profile, path, input.valueAsNumber);
+    for (const input of this.#typed) {
+      const path = input.name;
+      if (!input.checkValidity()) throw new Problem({ detail: "give a number", field: path });
+      if (path === "lens.tilt_deg") delete profile.lens.drift;
+      put(profile, path, input.valueAsNumber);
+    }
+    this.#typed.clear();
     this.use(profile);
   }
 

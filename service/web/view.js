@@ -29,6 +29,7 @@ const chosen = (name) => $(`[name=${name}]:checked`).value;
 const place = { yaw: 0, pitch: 0, eye: null };
 let frameMs = 0; // what the last panel image took
 let strip = null; // the sweep's pictures
+let last = null; // what the picture on the stage was asked for by
 let playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 // --- what is asked for ---------------------------------------------------------------------------
@@ -114,7 +115,7 @@ function refresh(rough = false) {
 async function showRough(signal) {
   const response = await render(roughBody(), "image/jpeg", signal);
   const image = await decode(await response.blob());
-  strip = null;
+  last = strip = null;
   draw(image);
   said("Draft: a single view. Rest, and the panel image follows.");
 }
@@ -122,9 +123,14 @@ async function showRough(signal) {
 async function showPanel(signal) {
   const started = performance.now();
   const mode = chosen("eyes");
+  const wanted = body("look", eyes());
+  const told = JSON.stringify([wanted, mode]);
+  if (told === last) return;
   said("The panel image is being made…");
-  const response = await render(body("look", eyes()), mode === "sweep" ? "image/jpeg" : "image/png", signal);
+  const accept = mode === "sweep" ? "image/jpeg" : "image/png";
+  const response = await render(wanted, accept, signal);
   const image = await decode(await response.blob());
+  last = told;
   const spans = timings(response);
   frameMs = spans.frame ?? frameMs;
   showTimings($("#timings"), spans, performance.now() - started);
@@ -387,6 +393,7 @@ async function start() {
   for (const radio of document.querySelectorAll("[name=eyes], #pair")) {
     radio.addEventListener("change", () => {
       modes();
+      last = null;
       refresh();
     });
   }

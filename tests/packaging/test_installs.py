@@ -116,6 +116,12 @@ def test_nothing_generic_lands_in_site_packages(built: Path, tmp_path: Path) -> 
     assert tops == {"lfd_render"}
 
 
+def test_the_page_is_in_the_wheel(built: Path, tmp_path: Path) -> None:
+    shutil.unpack_archive(next(built.glob("*.whl")), tmp_path, format="zip")
+    page = {path.name for path in (tmp_path / "lfd_render" / "service" / "web").iterdir()}
+    assert page == {path.name for path in (REPOSITORY / "service" / "web").iterdir()}
+
+
 def test_every_package_is_listed() -> None:
     text = (REPOSITORY / "pyproject.toml").read_text(encoding="utf-8")
     setuptools = tomllib.loads(text)["tool"]["setuptools"]
