@@ -65,9 +65,11 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         redoc_url=None,
     )
     app.state.failure = None  # why it could not start
-    problems.install(app)
-    for part in (health, scenes, pictures, jobs, streams, displays, calibration, page):
-        app.include_router(part.router)
+    parts = (health, scenes, pictures, jobs, streams, displays, calibration, page)
+    routers = [part.router for part in parts]
+    problems.install(app, [route for router in routers for route in router.routes])
+    for router in routers:
+        app.include_router(router)
     # The last one added is the outermost.
     app.add_middleware(Bodies, settings=chosen)
     app.add_middleware(Keys, settings=chosen)

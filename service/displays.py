@@ -21,7 +21,7 @@ from .display_store import is_shipped
 from .fields import DisplayName, Fields
 from .jobs import LATER
 from .media import choose
-from .problems import ProblemError, responses
+from .problems import ProblemError, links, responses
 from .state import Shared
 
 router = APIRouter(prefix="/v1", tags=["displays"])
@@ -103,6 +103,12 @@ async def list_displays(state: Shared) -> DisplayList:
     return DisplayList(displays=[_summary(name, profile) for name, profile in found.items()])
 
 
+_LINKS = links(
+    {"name": "$request.path.name"},
+    see="get_display_v1_displays__name__get",
+    map="view_map_v1_displays__name__map_get",
+    delete="delete_display_v1_displays__name__delete",
+)
 _PROFILE: dict[str, Any] = {"content": {"application/json": {"schema": {"type": "object"}}}}
 
 
@@ -121,7 +127,7 @@ async def get_display(request: Request, name: Name, state: Shared) -> Response:
 
 @router.put(
     "/displays/{name}", summary="Keep a display", response_class=Response,
-    responses={200: _PROFILE, 201: _PROFILE, **responses(409, 415, 507)},
+    responses={200: _PROFILE, 201: _PROFILE | {"links": _LINKS}, **responses(409, 415, 507)},
     openapi_extra={
         "requestBody": {
             "required": True,

@@ -17,7 +17,7 @@ from lfd_render.errors import LfdError
 from .fields import AnyBody, Fields
 from .job_store import JobState, StoredJob
 from .orders import of_body
-from .problems import Problem, ProblemError, as_problem, responses
+from .problems import Problem, ProblemError, as_problem, links, responses
 from .responses import ALWAYS, PIECE_BYTES, LiveResponse, matches
 from .state import Shared, State
 
@@ -89,6 +89,13 @@ LATER: dict[str, Any] = {
         "Location": {"schema": {"type": "string"}, "description": "The job."},
         "Retry-After": {"schema": {"type": "string"}, "description": "Seconds to the next look."},
     },
+    "links": links(
+        {"job": "$response.body#/id"},
+        see="get_job_v1_jobs__job__get",
+        watch="job_events_v1_jobs__job__events_get",
+        fetch="job_result_v1_jobs__job__result_get",
+        cancel="delete_job_v1_jobs__job__delete",
+    ),
 }
 _PICTURE: dict[int | str, dict[str, Any]] = {
     200: {
@@ -97,6 +104,12 @@ _PICTURE: dict[int | str, dict[str, Any]] = {
     },
     304: {"description": "The client has it."},
     **responses(406, 409, 504, 507),
+}
+
+
+_EVENT = {
+    "type": "object",
+    "properties": {"event": {"enum": ["progress", "end"]}, "data": {"type": "string"}},
 }
 
 
@@ -192,7 +205,7 @@ async def delete_job(job: JobId, state: Shared) -> Response:
     responses={
         200: {
             "description": "Server-sent events: `progress` with the job, the last one `end`.",
-            "content": {"text/event-stream": {"schema": {"type": "string"}}},
+            "content": {"text/event-stream": {"schema": _EVENT}},
         },
         **responses(),
     },

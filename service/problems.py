@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import re
+from collections.abc import Sequence
 from http import HTTPStatus
 from typing import Any
 
@@ -11,6 +12,8 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
+from starlette.routing import BaseRoute, Match, Route
+from starlette.types import Scope
 
 from lfd_render.engine.pool import InternalError
 from lfd_render.errors import BusyError, LfdError, OptionError, http_status
@@ -103,8 +106,16 @@ def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
     }
 
 
-def install(app: FastAPI) -> None:
-    """Answer every error of the application with a problem."""
+def links(parameters: dict[str, str], **operations: str) -> dict[str, Any]:
+    """For OpenAPI: what can be done with what an answer names, by operations' ids."""
+    return {
+        name: {"operationId": operation, "parameters": parameters}
+        for name, operation in operations.items()
+    }
+
+
+def install(app: FastAPI, routes: Sequence[BaseRoute]) -> None:
+    """Answer every error of the application, which has these routes, with a problem."""
 
     def answer(
         request: Request,
@@ -137,8 +148,19 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(HTTPException)
     async def http(request: Request, error: HTTPException) -> Response:
-        headers = dict(error.headers) if error.headers else None
+        headers = dict(error.headers or {})
+        if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
+            headers["Allow"] = ", ".join(sorted(_allowed(routes, request.scope)))
         return answer(request, error.status_code, str(error.detail), None, headers)
+
+
+def _allowed(routes: Sequence[BaseRoute], scope: Scope) -> set[str]:
+    """The methods of a path: of all its routes, where one alone knows but its own."""
+    found = set()
+    for route in routes:
+        if isinstance(route, Route) and route.matches(scope)[0] != Match.NONE:
+            found |= route.methods or set()
+    return found
 
 
 def place(location: tuple[int | str, ...]) -> str:

@@ -16,7 +16,7 @@ from lfd_render.engine.jobs import Job, SceneFacts
 from lfd_render.scene.builtin import BUILTINS, PREFIX
 
 from .answers import racing
-from .problems import ProblemError, responses
+from .problems import ProblemError, links, responses
 from .scene_store import StoredScene, Upload
 from .state import Shared, State
 
@@ -47,7 +47,7 @@ class SceneAnswer(BaseModel):
     images: int | None = None
     lights: int | None = None
     cameras: list[str] = Field(default_factory=list, description="Names for `camera`.")
-    bounds: tuple[list[float], list[float]] | None = Field(
+    bounds: Annotated[list[list[float]], Field(min_length=2, max_length=2)] | None = Field(
         None, description="Lowest and highest corner of the scene's box."
     )
     bytes: int | None = Field(None, description="What it takes in memory.")
@@ -73,13 +73,38 @@ async def list_scenes(state: Shared) -> SceneList:
     return SceneList(scenes=[*map(_answer, state.scenes.all()), *own])
 
 
+_TRIANGLE = {
+    "asset": {"version": "2.0"},
+    "scenes": [{"nodes": [0]}],
+    "nodes": [{"mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+    "accessors": [{
+        "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+        "min": [0, 0, 0], "max": [1, 1, 0],
+    }],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}],
+    "buffers": [{
+        "byteLength": 36,
+        "uri": "data:application/octet-stream;base64,"
+        "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA",
+    }],
+}  # fmt: skip
+_LINKS = links(
+    {"scene": "$response.body#/id"},
+    see="get_scene_v1_scenes__scene__get",
+    render="eia_v1_scenes__scene__eia_get",
+    delete="delete_scene_v1_scenes__scene__delete",
+)
+
+
 @router.post(
     "",
     summary="Upload a scene",
     status_code=201,
     response_model=SceneAnswer,
     responses={
-        200: {"model": SceneAnswer, "description": "It was there already."},
+        200: {"model": SceneAnswer, "description": "It was there already.", "links": _LINKS},
+        201: {"links": _LINKS},
         **responses(408, 415, 504, 507),
     },
     openapi_extra={
@@ -87,6 +112,7 @@ async def list_scenes(state: Shared) -> SceneList:
             "required": True,
             "content": {
                 "model/gltf-binary": {"schema": {"type": "string", "format": "binary"}},
+                "model/gltf+json": {"schema": {"type": "object"}, "example": _TRIANGLE},
                 "multipart/form-data": {
                     "schema": {
                         "type": "object",
