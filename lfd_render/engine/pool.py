@@ -279,15 +279,17 @@ class Pool:
         self, idle: list[RenderProcess], candidates: list[_Ticket]
     ) -> tuple[RenderProcess, _Ticket]:
         """The job that goes next and the process it goes to: the first, unless one behind it finds
-        its scene warm and the first has not waited long."""
+        its scene warm and the first has not waited long; of equal processes the one that has
+        idled longest."""
         first = candidates[0]
         patient = time.monotonic() - first.submitted < _PATIENCE_S
         candidates = candidates if patient else [first]
-        # max takes the first of equals: the oldest job, and the process that idles.
         return max(
             ((process, ticket) for ticket in candidates for process in idle),
-            key=lambda pair: _warmth(pair[0], pair[1].job),
-        )
+            key=lambda pair: (
+                _warmth(pair[0], pair[1].job), -pair[1].submitted, -pair[0].idle_since,
+            ),
+        )  # fmt: skip
 
     def _heard(self, process: RenderProcess, message: Any) -> None:
         if process not in self._busy:
@@ -309,6 +311,7 @@ class Pool:
 
     def _answered(self, process: RenderProcess, message: Done | Failed) -> None:
         ticket, self._busy[process] = self._busy[process], None
+        process.idle_since = time.monotonic()
         if message.holds:
             process.holds = message.holds
         if ticket is not None:

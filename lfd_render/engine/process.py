@@ -40,6 +40,7 @@ class RenderProcess:
         self.renderer: str | None = None  # once it is ready
         self.software = False
         self.holds = NOTHING
+        self.idle_since = 0.0  # on the monotonic clock
         self.condemned = False  # ended by us for what it did
         self._loop = asyncio.get_running_loop()
         self._on_message, self._on_end = on_message, on_end

@@ -24,7 +24,6 @@ from lfd_render.engine.jobs import (
     QuiltPicture,
     Result,
     SceneFacts,
-    SceneSource,
     Seen,
     ViewMap,
 )
@@ -101,7 +100,7 @@ class Workshop:
         scene = self._scenes.get(source.id)
         if scene is None:
             with spans.span("load"):
-                scene = _load(source)
+                scene = Scene.load(source.path, source.limits)
                 self._scenes.put(source.id, scene, scene_bytes(scene))
         return scene
 
@@ -130,8 +129,9 @@ class Workshop:
 
     def _remember(self, job: Job) -> None:
         assert job.scene is not None
-        self._scene_of = {k: v for k, v in self._scene_of.items() if k in set(self._frames)}
         self._scene_of[job.frame_key] = job.scene.id
+        kept = set(self._frames)
+        self._scene_of = {key: scene for key, scene in self._scene_of.items() if key in kept}
 
     def _panel_image(self, job: Job, progress: Progress, spans: Spans) -> Result:
         eia = self._eia(job, progress, spans)
@@ -274,11 +274,6 @@ class Spans:
     def add(self, spans: dict[str, float]) -> None:
         """Take over what another clock measured."""
         self.ms |= spans
-
-
-def _load(source: SceneSource) -> Scene:
-    """The scene, with its file's place on this machine left out of warnings."""
-    return Scene.load(source.path, source.limits)
 
 
 def _display(job: Job) -> DisplayProfile:

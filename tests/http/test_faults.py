@@ -15,7 +15,7 @@ import httpx
 import pytest
 
 from .conftest import GLTF, PATH, PROFILE, Server, Start
-from .faults.sitecustomize import BREAK, CRASH, EAT, HANG, SLOW
+from .faults.sitecustomize import BREAK, CRASH, EAT, HANG, SLOW, SWELL
 
 pytestmark = pytest.mark.needs("gl")
 FAULTS = Path(__file__).parent / "faults"
@@ -27,7 +27,7 @@ def server(start: Start, tmp_path_factory: pytest.TempPathFactory) -> Iterator[S
     folder = tmp_path_factory.mktemp("data")
     settings = {
         "grace_s": 1,
-        "process_memory_mb": 2048,
+        "process_memory_mb": 1024,
         "data_dir": folder,
     }
     with start("--processes", "2", python_path=FAULTS, **settings) as server:
@@ -135,6 +135,12 @@ def test_a_scene_that_hangs_meets_its_deadline(client: httpx.Client) -> None:
 
 def test_a_scene_that_eats_memory_is_told_so(client: httpx.Client) -> None:
     assert "out of memory" in problem(eia(client, scene(5), seed=EAT), 413)["detail"]
+
+
+def test_a_process_that_grows_too_large_is_ended(client: httpx.Client) -> None:
+    before = metric(client, "lfd_process_restarts_total")
+    problem(eia(client, scene(7), seed=SWELL), 422)
+    assert metric(client, "lfd_process_restarts_total") - before == 2
 
 
 def test_what_nobody_expected_is_logged_not_told(server: Server, client: httpx.Client) -> None:

@@ -1,12 +1,14 @@
 """Planted in render processes by PYTHONPATH: seeds from 900 on make them fail as scenes might."""
 
+import mmap
 import os
 import signal
 import sys
 import time
 
-CRASH, HANG, EAT, SLOW, BREAK = 900, 901, 902, 903, 904
+CRASH, HANG, EAT, SLOW, BREAK, SWELL = range(900, 906)
 SLOW_S = 1.0
+SWELL_BYTES = 1 << 30
 
 if "lfd_render.engine.worker" in sys.orig_argv:
     import numpy as np
@@ -23,6 +25,10 @@ if "lfd_render.engine.worker" in sys.orig_argv:
             time.sleep(1000)
         elif seed == EAT:
             self.eaten = [np.empty(1 << 28, np.uint8) for _ in range(1 << 8)]
+        elif seed == SWELL:  # where no limit on allocation reaches
+            self.swollen = mmap.mmap(-1, SWELL_BYTES)
+            for _ in range(SWELL_BYTES >> 20):
+                self.swollen.write(bytes(1 << 20))
         elif seed == BREAK:
             raise ZeroDivisionError("planted")
         elif seed == SLOW:
