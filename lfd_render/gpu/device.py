@@ -24,11 +24,13 @@ from lfd_render.gpu.raw import (
     MAX_GEOMETRY_SHADER_INVOCATIONS,
     MAX_GEOMETRY_SHADER_STORAGE_BLOCKS,
     MAX_GEOMETRY_TOTAL_OUTPUT_COMPONENTS,
+    MAX_VIEWS_OVR,
     OUT_OF_MEMORY,
     RawGl,
 )
 
 REQUIRED_VERSION = 450
+MULTIVIEW = "GL_OVR_multiview2"  # OVR_multiview alone lets nothing but gl_Position depend on a view
 GEOMETRY_STORAGE_BLOCKS = 10  # of cells/align.geom
 STORAGE_BLOCKS = 16  # of the largest shader; OpenGL promises 8, Mesa offers 16
 SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "lavapipe")
@@ -59,6 +61,7 @@ class DeviceInfo:
     max_geometry_vertices: int  # that an invocation of the geometry stage emits
     max_geometry_components: int  # of all of them
     max_geometry_invocations: int  # a triangle
+    max_multiview: int  # views of a multiview target, 0 without MULTIVIEW
     max_texture_bytes: int  # of one texture with its mip levels
     texture_budget_bytes: int  # of all textures of a scene
 
@@ -184,6 +187,7 @@ def _describe(context: moderngl.Context, raw: RawGl, egl_index: int) -> DeviceIn
         max_geometry_vertices=raw.integer(MAX_GEOMETRY_OUTPUT_VERTICES),
         max_geometry_components=raw.integer(MAX_GEOMETRY_TOTAL_OUTPUT_COMPONENTS),
         max_geometry_invocations=raw.integer(MAX_GEOMETRY_SHADER_INVOCATIONS),
+        max_multiview=raw.integer(MAX_VIEWS_OVR) if MULTIVIEW in context.extensions else 0,
         max_texture_bytes=max_texture_bytes,
         texture_budget_bytes=texture_budget_bytes,
     )

@@ -105,6 +105,8 @@ def rasterising(device: Device, clips: int) -> Iterator[None]:
             raw.glDisable(gl.CLIP_DISTANCE0 + index)
         raw.glDisable(gl.CULL_FACE)
         raw.glDisable(gl.DEPTH_TEST)
+        # While a multiview target is in use compute shaders too may run once a view.
+        raw.glBindFramebuffer(gl.FRAMEBUFFER, 0)
 
 
 @contextmanager

@@ -70,22 +70,27 @@ class PassTarget(Owned):
         )
 
     def _attach_layers(self, point: int, layers: Layers) -> None:
-        texture, raw = layers.texture, self._device.raw
-        view = ctypes.c_uint()
-        raw.glGenTextures(1, ctypes.byref(view))
-        raw.glTextureView(
-            view, gl.TEXTURE_2D_ARRAY, texture.name, texture.internal_format, 0, 1,
-            layers.first, layers.count,
-        )  # fmt: skip
-        self._views.append(view)
-        raw.glNamedFramebufferTexture(self._name, point, view, 0)
+        self._device.raw.glNamedFramebufferTexture(self._name, point, self._view(layers), 0)
 
     def _attach_multiview(self, point: int, layers: Layers) -> None:
         raw = self._device.raw
         raw.glBindFramebuffer(gl.FRAMEBUFFER, self._name)
+        # Of a view, since the first layer must be the same for all attachments.
         raw.glFramebufferTextureMultiviewOVR(
-            gl.FRAMEBUFFER, point, layers.texture.name, 0, layers.first, layers.count
+            gl.FRAMEBUFFER, point, self._view(layers), 0, 0, layers.count
         )
+
+    def _view(self, layers: Layers) -> ctypes.c_uint:
+        """These layers as a texture of their own."""
+        texture, raw = layers.texture, self._device.raw
+        view = ctypes.c_uint()
+        raw.glGenTextures(1, ctypes.byref(view))
+        self._views.append(view)
+        raw.glTextureView(
+            view, gl.TEXTURE_2D_ARRAY, texture.name, texture.internal_format, 0, 1,
+            layers.first, layers.count,
+        )  # fmt: skip
+        return view
 
     def use(self, x: int, y: int, width: int, height: int) -> None:
         """Draw from now on into these pixels of all layers."""

@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lfd_render.gpu.device import Device
+from lfd_render.gpu.device import MULTIVIEW, Device
 
 LAYERS = "GL_ARB_shader_viewport_layer_array"
-MULTIVIEW = "GL_OVR_multiview2"  # OVR_multiview alone lets nothing but gl_Position depend on a view
 # Floats that the geometry stage emits a corner: position, clip distances, layer and id; with those
 # of raster/corner.glsl.
 BARE = 8
@@ -106,8 +105,10 @@ class Pipeline:
         """
         info, at_once = device.info, self.views_a_pass(views)
         if self.amplification == "multiview":
-            if MULTIVIEW not in info.extensions:
+            if not info.max_multiview:
                 return f"{device.name} lacks {MULTIVIEW}; use loop-4, instanced-4 or multipass"
+            if at_once > info.max_multiview:
+                return f"{device.name} draws {info.max_multiview} views at once; use multiview-2"
             if views < self.at_once:
                 return f"{views} views are fewer than the {self.at_once} of a pass; use multipass"
         if self.amplification == "instanced" and self.layered and LAYERS not in info.extensions:

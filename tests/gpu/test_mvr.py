@@ -307,6 +307,11 @@ def test_devices_say_what_they_lack(device: Device) -> None:
         assert why is not None
         assert "poor" in why
         assert why.rpartition("use ")[2].split(", ")[-1].split(" or ")[-1] in VARIANTS
+    twin = Poor()
+    twin.info = dataclasses.replace(device.info, max_multiview=2)  # type: ignore[misc]
+    assert problem(twin, "multiview-2", 48) is None  # type: ignore[arg-type]
+    assert str(problem(twin, "multiview-4", 48)).endswith("use multiview-2")  # type: ignore[arg-type]
+    assert "fewer" in str(problem(twin, "multiview-2", 1))  # type: ignore[arg-type]
     assert problem(device, "invocations", device.info.max_geometry_invocations + 1)
     assert problem(device, "loop", 1024)
     assert problem(device, "loop-4", 1024) is None
