@@ -93,9 +93,7 @@ async def _running(
 ) -> AsyncIterator[State]:
     """What handlers share, from the first render process to the last. Raises LfdError."""
     with data_folder(settings.data_dir) as folder:
-        stored = SceneStore(
-            folder / "scenes", settings.limits, settings.max_scenes, settings.upload_bytes
-        )
+        stored = SceneStore(folder / "scenes", settings)
         jobs_made = JobStore(folder / "jobs", settings, pool, stored)
         kept = DisplayStore(folder / "displays", settings.max_displays)
         answers: ByteLru[Picture] = ByteLru(settings.answer_cache_mb << 20)

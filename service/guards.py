@@ -80,8 +80,8 @@ class SameSite:
                     "LFD_CORS_ORIGINS lists those that may", "Origin",
                 )  # fmt: skip
             return
-        site, mode = headers.get("sec-fetch-site", "none"), headers.get("sec-fetch-mode")
-        visit = mode == "navigate" and scope.get("method") == "GET"
+        site, shown = headers.get("sec-fetch-site", "none"), headers.get("sec-fetch-dest")
+        visit = shown == "document" and scope.get("method") == "GET"  # a link that was followed
         if site not in ("none", "same-origin") and not visit:
             raise ProblemError(
                 403, f"Sec-Fetch-Site: '{site[:40]}'; pages elsewhere may not use this server",

@@ -16,10 +16,10 @@ from typing import Any
 
 from lfd_render.engine.jobs import SceneSource
 from lfd_render.errors import SceneError
-from lfd_render.scene import LoadLimits
 from lfd_render.scene.builtin import PREFIX, parse_builtin
 
 from .problems import ProblemError
+from .settings import Settings
 
 SUFFIXES = (".glb", ".gltf", ".obj")
 _MOST_FILES = 512
@@ -142,10 +142,9 @@ class SceneStore:
     A scene that is deleted while pictures of it are made stays on disk until they are done.
     """
 
-    def __init__(self, folder: Path, limits: LoadLimits, most_scenes: int, most_bytes: int) -> None:
+    def __init__(self, folder: Path, settings: Settings) -> None:
         self._folder = folder
-        self._limits = limits
-        self._most_scenes, self._most_bytes = most_scenes, most_bytes
+        self._settings = settings
         self._leases: Counter[str] = Counter()
         folder.mkdir(parents=True, exist_ok=True)
         for left in folder.glob(".*"):  # of a server that was ended
@@ -197,14 +196,17 @@ class SceneStore:
     @contextmanager
     def upload(self) -> Iterator[Upload]:
         """A place for a new scene's files, removed unless it is added. Raises ProblemError."""
-        if len(self._scenes) >= self._most_scenes:
+        settings = self._settings
+        held = sum(sum(scene.files.values()) for scene in self._scenes.values())
+        if len(self._scenes) >= settings.max_scenes or held >= settings.max_scenes_mb << 20:
             raise ProblemError(
-                507, f"there are {self._most_scenes} scenes; delete one first", "scenes"
-            )
+                507, f"{len(self._scenes)} scenes of {held} bytes are kept; delete one first",
+                "scenes",
+            )  # fmt: skip
         folder = self._folder / f".{uuid.uuid4().hex}"
         (folder / "files").mkdir(parents=True)
         try:
-            yield Upload(folder / "files", self._most_bytes)
+            yield Upload(folder / "files", settings.upload_bytes)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
@@ -227,7 +229,7 @@ class SceneStore:
         return scene, True
 
     def _source(self, scene_id: str, path: Path) -> SceneSource:
-        return SceneSource(scene_id, str(path), path.name, self._limits)
+        return SceneSource(scene_id, str(path), path.name, self._settings.limits)
 
 
 def _builtin(scene_id: str) -> SceneSource:

@@ -70,6 +70,7 @@ class Settings(BaseModel):
     max_streams: Whole = Field(16, description="Streams at a time.")
     max_upload_mb: Whole = Field(256, description="Size of an uploaded scene, all files together.")
     max_scenes: Whole = Field(1000, description="Uploaded scenes that are kept at a time.")
+    max_scenes_mb: Whole = Field(16384, description="Size of all uploaded scenes on disk.")
     max_displays: Whole = Field(1000, description="Displays that are kept besides those shipped.")
     max_texels: Whole = Field(1 << 28, description="Pixels of all textures of an uploaded scene.")
     max_triangles: Whole = Field(1 << 24, description="Triangles of an uploaded scene as drawn.")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import os
 import signal
 import time
 from collections import Counter
@@ -448,8 +447,3 @@ def _error(failed: Failed) -> Exception:
     kind = getattr(lfd_render.errors, failed.kind)
     error: Exception = kind(*failed.arguments)
     return error
-
-
-def usable_cores() -> int:
-    """Cores that this program may use."""
-    return len(os.sched_getaffinity(0))
