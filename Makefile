@@ -7,9 +7,11 @@
 #   make lint     ruff and mypy
 #   make clean    remove what these made, except the environment
 #
-# PYTHON=... chooses the interpreter, VENV=... the environment's folder.
+# PYTHON=... chooses the interpreter, VENV=... the environment's folder, EXTRAS=dev,ray what tests
+# may use: those of Ray Serve skip without it, since it takes 240 MB.
 
 VENV ?= .venv
+EXTRAS ?= dev
 BIN = $(VENV)/bin
 
 .PHONY: demo test verify lint clean system system-test
@@ -50,5 +52,5 @@ $(VENV)/base.stamp: pyproject.toml
 
 $(VENV)/dev.stamp: pyproject.toml
 	@./bootstrap.sh system venv
-	@./bootstrap.sh venv $(VENV) "[dev]"
+	@./bootstrap.sh venv $(VENV) "[$(EXTRAS)]"
 	@touch $@ $(VENV)/base.stamp

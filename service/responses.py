@@ -43,7 +43,7 @@ class PiecesResponse(Response):
         body = memoryview(self.body)
         for start in range(0, max(len(body), 1), PIECE_BYTES):
             end = start + PIECE_BYTES
-            piece = body[start:end]
+            piece = bytes(body[start:end])  # as ASGI has it, and Ray needs it
             await send({"type": "http.response.body", "body": piece, "more_body": end < len(body)})
 
 
