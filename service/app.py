@@ -35,6 +35,10 @@ Panel images (EIA) of 3D scenes for tilted-lenticular light-field displays.
 Options are those of the `lfd-render` command, with underscores. `Accept` chooses the format; an
 unchanged picture is answered 304 by its `ETag`. Errors are `application/problem+json`.
 """
+_ALLOWED = [
+    "Authorization", "X-API-Key", "X-Request-Id", "Content-Type", "If-None-Match", "Prefer",
+    "Idempotency-Key",
+]  # fmt: skip
 _EXPOSED = ["ETag", "Server-Timing", "Location", "Retry-After", "LFD-Size", "LFD-Warnings"]
 
 
@@ -78,7 +82,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             CORSMiddleware,
             allow_origins=chosen.cors_origins,
             allow_methods=["GET", "HEAD", "POST", "PUT", "DELETE"],
-            allow_headers=["Authorization", "X-API-Key", "Content-Type", "If-None-Match"],
+            allow_headers=_ALLOWED,
             expose_headers=_EXPOSED,
         )
     app.add_middleware(SameSite, settings=chosen)

@@ -1,5 +1,6 @@
 """What is refused, with which status, naming what: bad input, strangers, too much of anything."""
 
+import asyncio
 import io
 import json
 import struct
@@ -11,7 +12,9 @@ from typing import Any
 
 import httpx
 import pytest
+from lfd_render.service.guards import Keys
 from lfd_render.service.settings import Settings
+from starlette.types import Message, Receive, Scope, Send
 
 from lfd_render.errors import UsageError
 
@@ -267,6 +270,24 @@ def test_keys_are_asked_for(guarded: Server) -> None:
         for headers in ({"X-API-Key": KEY}, {"Authorization": "Bearer another"}):
             assert client.get("/v1/displays", headers=headers).status_code == 200
         assert all(KEY not in line for line in guarded.log)
+
+
+def test_strangers_need_a_key() -> None:
+    statuses: list[int] = []
+
+    async def inner(scope: Scope, receive: Receive, send: Send) -> None:
+        await send({"type": "http.response.start", "status": 200})
+
+    async def send(message: Message) -> None:
+        statuses.extend([message["status"]] if "status" in message else [])
+
+    async def receive() -> Message:
+        return {"type": "http.request"}
+
+    for address in ("192.0.2.7", "::ffff:192.0.2.7", "127.0.0.1", "::1"):
+        scope = {"type": "http", "path": "/v1/displays", "headers": [], "client": (address, 9)}
+        asyncio.run(Keys(inner, Settings())(scope, receive, send))
+    assert statuses == [403, 403, 200, 200]
 
 
 def test_pages_that_are_allowed_may(guarded: Server) -> None:
