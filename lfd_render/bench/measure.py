@@ -1,0 +1,314 @@
+"""Times contenders in turn on the same moving scene, each with its own stage on one device.
+
+What else a machine does falls on all of them alike, so ratios within a group are what counts. A
+picture is judged (`bench.check`) before it is timed, after a frame from elsewhere, so that nothing
+left from before can pass.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lfd_render.bench.check import Standard, Verdict, against_peers, verdict
+from lfd_render.bench.contenders import Contender
+from lfd_render.bench.gold import alone, chosen_views, gold_standard
+from lfd_render.bench.suites import Group
+from lfd_render.display import Camera, DisplayProfile
+from lfd_render.errors import GpuError, LfdError, ResourceError
+from lfd_render.gpu.device import Device
+from lfd_render.panel.eia import Eia
+from lfd_render.quality import rmse, ssim_luma
+from lfd_render.renderer import Renderer, Stage, camera_for, upright_size
+from lfd_render.renderer.stage import REPEAT_TURN_RAD
+from lfd_render.scene import Scene
+
+Pixels = NDArray[np.uint8]
+Told = Callable[[str], None]
+_ELSEWHERE_RAD = 0.35  # how far the frame before the one that is judged is turned away
+_PANEL_STAGES = ("average", "encode_srgb", "weave")
+_POINT_STAGES = ("transform", "sample")
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is done. rounds: counted frames of each contender; compared: views of the standard,
+    with samples × samples a pixel; gold_size: pixels of the panel image's standard's views, None:
+    none is made."""
+
+    rounds: int = 15
+    warm_ups: int = 5
+    compared: int = 3
+    samples: int = 8
+    gold_views: int = 96
+    gold_size: tuple[int, int] | None = (960, 540)
+
+
+@dataclass
+class Row:
+    """What one contender did in a group. gap: why there is nothing, or None; fault: what is wrong
+    with its picture. Times in ms, memory in bytes; eia: against the panel image's standard, view:
+    against single views' as an eye sees them, RMSE in levels of 255."""
+
+    group: str
+    suite: str
+    scene: str
+    triangles: int
+    views: int
+    supersample: tuple[int, int]
+    contender: str
+    technique: str
+    aa: str
+    notation: str = ""
+    gap: str | None = None
+    fault: str | None = None
+    frames_ms: list[float] = field(default_factory=list)
+    stages_ms: dict[str, float] = field(default_factory=dict)
+    compile_ms: float = 0.0
+    points: int = 0
+    device_bytes: int = 0
+    view_size: tuple[int, int] = (0, 0)
+    view_rmse: float | None = None
+    view_ssim: float | None = None
+    detail: float | None = None
+    eia_rmse: float | None = None
+    eia_ssim: float | None = None
+
+    @property
+    def rasterises(self) -> bool:
+        """Whether it is multi-view rasterisation."""
+        return self.technique.startswith("mvr")
+
+    @property
+    def valid(self) -> bool:
+        """Whether its time counts."""
+        return self.gap is None and self.fault is None and bool(self.frames_ms)
+
+    @property
+    def median_ms(self) -> float:
+        """Of the counted frames."""
+        return statistics.median(self.frames_ms)
+
+    @property
+    def spread(self) -> float:
+        """Half the interquartile range over the median."""
+        if len(self.frames_ms) < 2:
+            return 0.0
+        low, _, high = statistics.quantiles(self.frames_ms, n=4, method="inclusive")
+        return 0.5 * (high - low) / self.median_ms
+
+    def stage_ms(self, kind: str) -> float:
+        """Of the median frame: ``points`` (0 for rasterisers), ``views`` or ``eia``."""
+        parts = {"points": 0.0, "views": 0.0, "eia": 0.0}
+        for name, ms in self.stages_ms.items():
+            points = name in _POINT_STAGES and not self.rasterises
+            parts["points" if points else "eia" if name in _PANEL_STAGES else "views"] += ms
+        return parts[kind]
+
+
+@contextmanager
+def _naming_gaps(row: Row) -> Iterator[None]:
+    """What keeps one contender from its work is its gap, and no one else's."""
+    try:
+        yield
+    except (ResourceError, GpuError) as error:
+        row.gap = str(error)
+    except MemoryError as error:
+        row.gap = f"out of memory: {error}"
+
+
+@dataclass
+class _Running:
+    """A contender at work."""
+
+    row: Row
+    renderer: Renderer
+    stage: Stage
+    verdict: Verdict
+    eia: Pixels
+
+
+class Bench:
+    """Measures group by group, keeping the scene and its standard between groups that share them.
+
+    device: stays the caller's.
+    """
+
+    def __init__(
+        self, device: Device, display: DisplayProfile, effort: Effort, told: Told = lambda _: None
+    ) -> None:
+        """told: what is being done now, in a few words."""
+        self._device, self._display, self._effort, self._told = device, display, effort, told
+        self._scene: tuple[str, Scene] | None = None
+        self._standards: dict[tuple[str, int, tuple[int, int] | None], Standard] = {}
+        self._gold: dict[str, Pixels] = {}
+
+    def rows(self, group: Group) -> list[Row]:
+        """Measure one group. What a contender cannot do is said in its row. Raises LfdError where
+        nobody can do anything: no such scene, no room for the standard."""
+        self._told(f"{group.scene}: loading")
+        scene = self._load(group.scene)
+        camera = camera_for(scene, self._display)
+        standard = self._standard(group, scene, camera)
+        gold = self._gold_eia(group, scene, camera)
+        rows = [self._row(group, scene, contender) for contender in group.contenders]
+        running: list[_Running] = []
+        try:
+            for row, contender in zip(rows, group.contenders, strict=True):
+                self._told(f"{group.scene}: preparing {row.contender}")
+                found = self._start(group, row, contender, scene=scene, camera=camera,
+                                    standard=standard)  # fmt: skip
+                if found is not None:
+                    running.append(found)
+            _judge_together(running)
+            for found in running:
+                if gold is not None:
+                    found.row.eia_rmse = rmse(gold, found.eia)
+                    found.row.eia_ssim = ssim_luma(gold, found.eia)
+            self._run(group, [found for found in running if not found.row.fault], camera)
+        finally:
+            for found in running:
+                found.renderer.close()
+        return rows
+
+    def _load(self, source: str) -> Scene:
+        if self._scene is None or self._scene[0] != source:
+            self._scene = (source, Scene.load(source))
+            self._standards.clear()
+            self._gold.clear()
+        return self._scene[1]
+
+    def _standard(self, group: Group, scene: Scene, camera: Camera) -> Standard:
+        key = (group.scene, group.views, group.view_size)
+        if key not in self._standards:
+            self._told(f"{group.scene}: standard of single views")
+            rig = self._display.rig(group.views)
+            # The extreme views are seen from the edge of the cone, where an eye is between two.
+            views = tuple(chosen_views(group.views, self._effort.compared + 2)[1:-1])
+            with Renderer(self._device) as judge:
+                pictures = tuple(
+                    gold_standard(
+                        judge, scene, self._display, camera, eye=alone(rig, view),
+                        view_size=group.view_size or upright_size(self._display, group.views),
+                        samples=self._effort.samples,
+                    )
+                    for view in views
+                )  # fmt: skip
+            self._standards[key] = Standard(views, pictures)
+        return self._standards[key]
+
+    def _gold_eia(self, group: Group, scene: Scene, camera: Camera) -> Pixels | None:
+        """The panel image's standard for the suites that tell of it."""
+        size = self._effort.gold_size
+        if size is None or group.suite not in ("aa", "supersample"):
+            return None
+        if group.scene not in self._gold:
+            self._told(f"{group.scene}: standard of the panel image")
+            with Renderer(self._device) as judge:
+                eia = judge.render(
+                    scene, self._display, camera, self._effort.gold_views, view_size=size,
+                    preset="gold", linear=False,
+                )  # fmt: skip
+            self._gold[group.scene] = eia.pixels
+        return self._gold[group.scene]
+
+    def _row(self, group: Group, scene: Scene, contender: Contender) -> Row:
+        return Row(
+            group=group.key, suite=group.suite, scene=group.scene, triangles=scene.triangle_count,
+            views=group.views, supersample=group.supersample, contender=contender.name,
+            technique=contender.technique, aa=contender.aa, notation=contender.notation,
+        )  # fmt: skip
+
+    def _start(
+        self,
+        group: Group,
+        row: Row,
+        contender: Contender,
+        *,
+        scene: Scene,
+        camera: Camera,
+        standard: Standard,
+    ) -> _Running | None:
+        """Stage one contender and judge its picture; None where it cannot, as its row then says."""
+        eyes = group.views * group.supersample[1]
+        row.gap = contender.problem(self._device, eyes)
+        if row.gap:
+            return None
+        ledger = self._device.ledger
+        before = ledger.total
+        renderer = Renderer(self._device)
+        with _naming_gaps(row):
+            begun = time.perf_counter()
+            stage = renderer.stage(
+                scene, self._display, camera, group.views, supersample=group.supersample,
+                view_size=group.view_size, **contender.options,
+            )  # fmt: skip
+            row.compile_ms = 1000 * (time.perf_counter() - begun)
+            peak = ledger.peak
+            stage.frame(camera.turned(_ELSEWHERE_RAD))
+            peak = max(peak, ledger.peak)
+            eia: Eia = stage.render(camera)
+            row.device_bytes = max(peak, ledger.peak) - before
+            row.points = eia.report["points"] or 0
+            row.view_size = (eia.report["view_size"][0], eia.report["view_size"][1])
+            found = verdict(eia.pixels, self._display, self._display.rig(group.views), standard)
+            return _Running(row, renderer, stage, found, eia.pixels)
+        renderer.close()
+        return None
+
+    def _run(self, group: Group, running: list[_Running], camera: Camera) -> None:
+        """A B A B: frame by frame, all contenders by the same camera."""
+        count = self._effort.warm_ups + self._effort.rounds
+        for index in range(count):
+            self._told(f"{group.scene}, {group.views} views: frame {index + 1} of {count}")
+            at = camera.turned(float(REPEAT_TURN_RAD) * (index - count // 2))
+            for found in running:
+                if found.row.gap:
+                    continue
+                with _naming_gaps(found.row):
+                    ms = found.stage.frame(at)
+                    if index >= self._effort.warm_ups:
+                        found.row.frames_ms.append(round(ms, 3))
+        for found in running:
+            with _naming_gaps(found.row):
+                if found.row.gap is None:
+                    timings = found.stage.read().report["timings_ms"]
+                    done_once = ("frame", "read", "upload", "compile", "prefilter")
+                    found.row.stages_ms = {
+                        name: ms for name, ms in timings.items() if name not in done_once
+                    }
+
+
+def _judge_together(running: list[_Running]) -> None:
+    """Verdicts once all are known: detail is compared between pictures under the same filter."""
+    for found in running:
+        peers = [other.verdict for other in running if other.row.aa == found.row.aa]
+        final = against_peers(found.verdict, peers)
+        row = found.row
+        row.fault, row.view_rmse, row.view_ssim = final.fault, final.rmse, final.ssim
+        row.detail = final.detail
+
+
+def unmeasured(group: Group, error: LfdError | MemoryError) -> list[Row]:
+    """Rows of a group that nobody could do."""
+    return [
+        Row(
+            group=group.key, suite=group.suite, scene=group.scene, triangles=0, views=group.views,
+            supersample=group.supersample, contender=contender.name,
+            technique=contender.technique, aa=contender.aa, notation=contender.notation,
+            gap=str(error) or type(error).__name__,
+        )
+        for contender in group.contenders
+    ]  # fmt: skip
+
+
+def best_mvr(rows: list[Row]) -> Row | None:
+    """The rasteriser of a group that counts: the fastest whose picture is right."""
+    rivals = [row for row in rows if row.rasterises and row.valid]
+    return min(rivals, key=lambda row: row.median_ms, default=None)

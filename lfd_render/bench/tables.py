@@ -1,0 +1,246 @@
+"""Results as Markdown, laid out as the papers' own tables, with the papers' numbers beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from lfd_render.bench.measure import Row, best_mvr
+from lfd_render.bench.papers import (
+    CATALOGUE,
+    CATALOGUE_COLUMNS,
+    TABLE_1,
+    TABLE_2,
+    TABLE_MVR,
+    Printed,
+)
+from lfd_render.bench.suites import SCENES
+
+_PAPER_NAMES = {source: name for name, source in SCENES.items()}
+
+
+def groups(rows: Sequence[Row], suite: str) -> list[list[Row]]:
+    """Rows of one suite, group by group, in order."""
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        if row.suite == suite:
+            found.setdefault(row.group, []).append(row)
+    return list(found.values())
+
+
+def report(rows: Sequence[Row], settings: Mapping[str, Any]) -> str:
+    """All tables that there are results for, gaps and faults named under each."""
+    parts = [_head(settings)]
+    for suite, (title, table) in _TABLES.items():
+        if found := groups(rows, suite):
+            parts.append(f"### {title}\n\n{table(found)}{_notes(found)}")
+    return "\n\n".join(parts) + "\n"
+
+
+def _head(settings: Mapping[str, Any]) -> str:
+    machine, effort = settings["machine"], settings["effort"]
+    changed = str(machine["commit"] or "")
+    built = f"commit {changed}" if changed else f"version {machine['version']}"
+    return (
+        f"Measured by `lfd-render bench` on {machine['date']}, {built}: {machine['renderer']}, "
+        f"{machine['driver']}, {machine['processor']}, {machine['cores']} cores. "
+        f"Medians of {effort['rounds']} frames of a turning scene after {effort['warm_ups']} "
+        "warm-ups, all rows of a group frame by frame in turn; ± half the interquartile range. "
+        "Times are wall clock between finishes. × is the time of the best multi-view rasterisation "
+        "of the group over the row's: more than 1 is faster than it. Every picture was checked "
+        "before it was timed."
+    )
+
+
+def scene_name(row: Row) -> str:
+    """What tables call a scene."""
+    source = row.scene.partition("?")[0]
+    return f"{source.removeprefix('builtin:')} ({_count(row.triangles)})"
+
+
+def paper_scene(row: Row) -> str:
+    """The paper's scene of this kind; empty for others."""
+    return _PAPER_NAMES.get(row.scene.partition("?")[0], "")
+
+
+def _count(number: int) -> str:
+    if number >= 999_500:
+        return f"{number / 1e6:.2f}M"
+    return f"{number / 1e3:.1f}K" if number >= 1000 else str(number)
+
+
+def ratio(row: Row, best: Row | None) -> str:
+    """The best rasteriser's time over a row's."""
+    return f"{best.median_ms / row.median_ms:.2f} ×" if best and row.valid else ""
+
+
+def _ms(value: float) -> str:
+    return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}"
+
+
+def _errors(whole: float | None, view: float | None, digits: int) -> str:
+    texts = [f"{v:.{digits}f}" for v in (whole, view) if v is not None]
+    return f"{texts[0]} ({texts[1]})" if len(texts) == 2 else f"({texts[0]})" if texts else ""
+
+
+def _printed(printed: Printed | None, mvr: Printed | None) -> str:
+    """Total, speed-up, and that with one pass for the panel image for both."""
+    if printed is None or mvr is None:
+        return ""
+    if printed is mvr:
+        return f"{printed.total_ms:.2f}"
+    shared = mvr.shared_eia(printed.eia_ms) / printed.total_ms
+    return f"{printed.total_ms:.2f} ({mvr.total_ms / printed.total_ms:.2f} ×; {shared:.2f} ×)"
+
+
+def _full(found: list[list[Row]], paper: Callable[[Row], str], first: str = "") -> str:
+    """Tables 1 and 2: one row a contender."""
+    columns = (
+        f"Scene{first} | Method | points, ms (number) | views, ms | panel image, ms | frame, ms | "
+        "× | memory, MB | RMSE of panel image (view) | SSIM (view) | "
+        "paper: ms (×; × with one panel pass)"
+    )
+    lines = [f"| {columns} |", "|---" * (columns.count("|") + 1) + "|"]
+    for rows in found:
+        best = best_mvr(rows)
+        for row in rows:
+            if not row.valid:
+                continue
+            scene = scene_name(row)
+            if first:
+                scene += f" | {_supersample(row)}"
+            points = f"{_ms(row.stage_ms('points'))} ({_count(row.points)})" if row.points else ""
+            mark = "**" if row is best else ""
+            cells = [
+                scene,
+                f"{mark}{row.contender}{mark}" + (f" {row.notation}" if row.notation else ""),
+                points,
+                _ms(row.stage_ms("views")),
+                _ms(row.stage_ms("eia")),
+                f"{_ms(row.median_ms)} ± {100 * row.spread:.0f} %",
+                ratio(row, best),
+                f"{row.device_bytes / 1e6:.0f}",
+                _errors(row.eia_rmse, row.view_rmse, 2),
+                _errors(row.eia_ssim, row.view_ssim, 3),
+                paper(row),
+            ]
+            lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _supersample(row: Row) -> str:
+    return "space" if row.supersample[0] > 1 else "angle" if row.supersample[1] > 1 else "none"
+
+
+def _of_table_1(row: Row) -> str:
+    scene = paper_scene(row)
+    kind = "mvr" if row.technique == "mvr:multipass" else row.aa
+    if row.technique not in ("mvr:multipass", "lfdpr:paper"):
+        return ""
+    return _printed(TABLE_1.get((scene, kind)), TABLE_1.get((scene, "mvr")))
+
+
+def _of_table_2(row: Row) -> str:
+    key = (paper_scene(row), row.supersample)
+    if row.technique not in ("mvr:multipass", "lfdpr:paper"):
+        return ""
+    kind = "mvr" if row.rasterises else "lfdpr"
+    return _printed(TABLE_2.get((*key, kind)), TABLE_2.get((*key, "mvr")))
+
+
+def _swept(found: list[list[Row]], label: str, of: Callable[[Row], str]) -> str:
+    """One row a group, one column a contender: milliseconds, and × of the best rasteriser."""
+    names = list(dict.fromkeys(row.contender for rows in found for row in rows))
+    lines = [f"| Scene | {label} | " + " | ".join(names) + " |", "|---" * (len(names) + 2) + "|"]
+    for rows in found:
+        best = best_mvr(rows)
+        by_name = {row.contender: row for row in rows}
+        cells = []
+        for name in names:
+            row = by_name.get(name)
+            if row is None or not row.valid:
+                cells.append("–")
+            elif row is best:
+                cells.append(f"**{_ms(row.median_ms)}**")
+            else:
+                cells.append(f"{_ms(row.median_ms)} ({ratio(row, best)})".replace(" ()", ""))
+        scene = next((r for r in rows if r.triangles), rows[0])
+        lines.append(f"| {scene_name(scene)} | {of(rows[0])} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _by_size(found: list[list[Row]]) -> str:
+    """Speed and error by view size."""
+    lines = [
+        "| Scene | views of | Method | frame, ms | × | RMSE of views | SSIM |",
+        "|---" * 7 + "|",
+    ]
+    for rows in found:
+        best = best_mvr(rows)
+        lines += [
+            f"| {scene_name(row)} | {row.view_size[0]} × {row.view_size[1]} | {row.contender} | "
+            f"{_ms(row.median_ms)} | {ratio(row, best)} | "
+            f"{_errors(None, row.view_rmse, 2)} | {_errors(None, row.view_ssim, 4)} |"
+            for row in rows
+            if row.valid
+        ]
+    return "\n".join(lines)
+
+
+def _catalogue(found: list[list[Row]]) -> str:
+    """All rasterisers, ranked in each group; then the columns that 004's tables have."""
+    lines = ["| Scene | views | Pipeline | | frame, ms | of plain | memory, MB |", "|---" * 7 + "|"]
+    for rows in found:
+        plain = next((r for r in rows if r.technique == "mvr:multipass" and r.valid), None)
+        for row in sorted((r for r in rows if r.valid), key=lambda r: r.median_ms):
+            share = f"{row.median_ms / plain.median_ms:.2f}" if plain else ""
+            lines.append(
+                f"| {scene_name(row)} | {row.views} | {row.technique.removeprefix('mvr:')} | "
+                f"{row.notation} | {_ms(row.median_ms)} ± {100 * row.spread:.0f} % | {share} | "
+                f"{row.device_bytes / 1e6:.0f} |"
+            )
+    names = list(CATALOGUE_COLUMNS)
+    lines += ["", f"| Scene | views | {' | '.join(names)} |", "|---" * (len(names) + 2) + "|"]
+    for rows in found:
+        of = {row.technique: row for row in rows}
+        wanted = [of.get(technique) for technique in CATALOGUE_COLUMNS.values()]
+        cells = [_ms(r.median_ms) if r and r.valid else "–" for r in wanted]
+        scene = next((r for r in rows if r.triangles), rows[0])
+        lines.append(f"| {scene_name(scene)} | {rows[0].views} | {' | '.join(cells)} |")
+    for views, printed in TABLE_MVR.items():
+        lines.append(f"| printed: {CATALOGUE} | {views} | {' | '.join(map(str, printed))} |")
+    return "\n".join(lines)
+
+
+def _notes(found: list[list[Row]]) -> str:
+    """What is missing, and what was caught."""
+    gaps: dict[str, list[str]] = {}
+    for rows in found:
+        for row in rows:
+            why = row.gap or (f"wrong picture, not timed: {row.fault}" if row.fault else None)
+            if why:
+                where = "" if row.gap and len(found) > 1 and _everywhere(found, row) else row.scene
+                gaps.setdefault(f"{row.contender}: {why}", []).append(where)
+    lines = []
+    for text, places in gaps.items():
+        named = ", ".join(dict.fromkeys(place for place in places if place))
+        lines.append(f"- Missing: {text}" + (f" ({named})" if named else "") + ".")
+    return "\n\n" + "\n".join(lines) if lines else ""
+
+
+def _everywhere(found: list[list[Row]], row: Row) -> bool:
+    same = [r for rows in found for r in rows if r.contender == row.contender]
+    return all(other.gap == row.gap for other in same)
+
+
+_TABLES: dict[str, tuple[str, Callable[[list[list[Row]]], str]]] = {
+    "aa": ("Filters (Table 1 of Gavane and Watson 2024)", lambda g: _full(g, _of_table_1)),
+    "supersample": (
+        "Supersampling (Table 2 of Gavane and Watson 2024)",
+        lambda g: _full(g, _of_table_2, " | SS"),
+    ),
+    "triangles": ("Time against triangles", lambda g: _swept(g, "views", lambda r: str(r.views))),
+    "views": ("Time against views", lambda g: _swept(g, "views", lambda r: str(r.views))),
+    "error": ("Speed against error (as Fig. 6 of EPR)", _by_size),
+    "mvr": ("The catalogue of multi-view rasterisation (Tables 2 to 4 of it)", _catalogue),
+}

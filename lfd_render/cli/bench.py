@@ -1,0 +1,247 @@
+"""`lfd-render bench`: techniques against each other on this machine, as tables and plots."""
+
+from __future__ import annotations
+
+import dataclasses
+import json as json_module
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from lfd_render.cli import options
+from lfd_render.cli.console import print_json, print_text, progress_bar, say, warn
+from lfd_render.cli.outputs import check_folder_output, make_folder
+from lfd_render.engine.texts import parse_size, parse_supersample
+from lfd_render.errors import EXIT_INTERRUPTED, LfdError, UsageError
+
+if TYPE_CHECKING:
+    from lfd_render.bench.measure import Effort, Row
+    from lfd_render.bench.results import Results
+    from lfd_render.bench.suites import Axes, Group
+    from lfd_render.display import DisplayProfile
+
+_QUICK_SUITES, _SUITES = ("aa",), ("aa", "supersample", "triangles", "views", "error")
+_QUICK_TECHNIQUES = ("lfdpr", "lfdpr:paper", "mvr:multipass", "mvr:multipass-deferred")
+
+
+def bench(
+    output: Annotated[
+        str,
+        typer.Argument(
+            metavar="FOLDER",
+            help="For results.jsonl, results.json, tables.md and plots; unfinished ones are "
+            "gone on with.",
+        ),
+    ],
+    *,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Small scenes and few frames: some three minutes.")
+    ] = False,
+    suite: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="aa, supersample, triangles, views, error or mvr."),
+    ] = None,
+    scene: Annotated[
+        list[str] | None, typer.Option(metavar="SCENE", help="Instead of the four bench scenes.")
+    ] = None,
+    technique: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="lfdpr, lfdpr:paper, mvr:VARIANT or mvr:all."),
+    ] = None,
+    aa: Annotated[list[options.Filter] | None, typer.Option(help="Filters of suite aa.")] = None,
+    supersample: Annotated[
+        list[str] | None, typer.Option(metavar="WHAT", help="Of suite supersample: 2, 2x1, 1x2, …")
+    ] = None,
+    views: Annotated[
+        list[int] | None, typer.Option(metavar="N", min=1, help="Of suites views and mvr.")
+    ] = None,
+    triangles: Annotated[
+        list[int] | None, typer.Option(metavar="N", min=1, help="Of suite triangles.")
+    ] = None,
+    scene_triangles: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=0, help="Of built-in scenes elsewhere; 0: their own number."),
+    ] = None,
+    view_size: options.ViewSizeOption = None,
+    rounds: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Counted frames of each.")
+    ] = None,
+    warm_ups: Annotated[int | None, typer.Option(metavar="N", min=0)] = None,
+    samples: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, max=16, help="Each way, a pixel of the standard's views."),
+    ] = None,
+    gold_size: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WxH|none",
+            help="View size of the panel image's standard; the paper's is the panel's own.",
+        ),
+    ] = None,
+    display: options.DisplayOption = options.DEFAULT_DISPLAY,
+    device: options.DeviceOption = "auto",
+    json: options.JsonOption = False,
+) -> None:
+    """Time techniques against the best multi-view rasterisation, each picture checked first."""
+    options.check_device(device)
+    folder = check_folder_output(output)
+
+    from lfd_render.bench.contenders import USUAL, techniques  # noqa: PLC0415 (keeps --help quick)
+    from lfd_render.bench.measure import Effort  # noqa: PLC0415
+    from lfd_render.bench.suites import FILTERS, Axes, groups_of  # noqa: PLC0415
+    from lfd_render.display import DisplayProfile  # noqa: PLC0415
+
+    default = Axes()
+    axes = Axes(
+        scenes=tuple(scene or default.scenes),
+        techniques=techniques(technique or (_QUICK_TECHNIQUES if quick else USUAL)),
+        aa=tuple(f.value for f in aa) if aa else (("none",) if quick else FILTERS),
+        supersample=_samples(supersample) or default.supersample,
+        views=tuple(views or ((24, 48) if quick else default.views)),
+        triangles=tuple(triangles or ((50_000, 100_000) if quick else default.triangles)),
+        view_sizes=((240, 180), (480, 360)) if quick else default.view_sizes,
+        extra="textures=256" if quick else "",
+        main_views=48,
+        main_size=parse_size("--view-size", view_size) or ((240, 180) if quick else None),
+        main_triangles=(50_000 if quick else 0) if scene_triangles is None else scene_triangles,
+    )
+    default_effort = Effort()
+    effort = Effort(
+        rounds=rounds or (3 if quick else default_effort.rounds),
+        warm_ups=(1 if quick else default_effort.warm_ups) if warm_ups is None else warm_ups,
+        compared=1 if quick else default_effort.compared,
+        samples=samples or (4 if quick else default_effort.samples),
+        gold_size=_gold_size(gold_size, None if quick else default_effort.gold_size),
+    )
+    groups = groups_of(suite or (_QUICK_SUITES if quick else _SUITES), axes)
+    profile = DisplayProfile.load(display)
+    make_folder(folder)
+    results, interrupted = _measure(folder, groups, axes, effort, profile=profile, device=device)
+    tables = _write(folder, results)
+    if json:
+        print_json({"folder": str(folder), **_summary(results)})
+    else:
+        print_text(tables)
+    faulty = [row for row in results.rows if row.fault]
+    for row in faulty:
+        warn(f"{row.scene}: {row.contender} {row.fault}")
+    missing = len(groups) - sum(group.key in results.groups for group in groups)
+    state = f", {missing} groups still to do" if missing else ""
+    say(f"{folder}: {len(results.groups)} groups of {len(groups)}{state}")
+    if interrupted:
+        raise typer.Exit(EXIT_INTERRUPTED)
+
+
+def _measure(
+    folder: Path,
+    groups: Sequence[Group],
+    axes: Axes,
+    effort: Effort,
+    *,
+    profile: DisplayProfile,
+    device: str,
+) -> tuple[Results, bool]:
+    """Measure what is missing; whether someone stopped it."""
+    from lfd_render.bench.machine import describe  # noqa: PLC0415 (keeps --help quick)
+    from lfd_render.bench.measure import Bench, unmeasured  # noqa: PLC0415
+    from lfd_render.bench.results import Results  # noqa: PLC0415
+    from lfd_render.gpu.device import Device  # noqa: PLC0415
+
+    opened = Device.open(device)
+    try:
+        settings = {
+            "machine": describe(opened),
+            "display": profile.hash,
+            "effort": dataclasses.asdict(effort),
+            "axes": dataclasses.asdict(axes),
+        }
+        results = Results(folder, settings)
+        with _telling() as tell:
+            bench = Bench(opened, profile, effort, tell)
+            todo = [group for group in groups if group.key not in results.groups]
+            for index, group in enumerate(todo):
+                tell.part = (index, len(todo))
+                try:
+                    rows = bench.rows(group)
+                except (LfdError, MemoryError) as error:
+                    rows = unmeasured(group, error)
+                results.add(rows)
+    except KeyboardInterrupt:
+        return results, True
+    finally:
+        opened.close()
+    return results, False
+
+
+class _Teller:
+    """Says what is being done: on a terminal as a bar's text, else a line a change of scene."""
+
+    def __init__(self, show: Callable[[float], None]) -> None:
+        self.part = (0, 1)
+        self._show = show
+        self._last = time.monotonic()
+
+    def __call__(self, text: str) -> None:
+        index, count = self.part
+        self._show(index / count)
+        if time.monotonic() - self._last > 20.0:
+            self._last = time.monotonic()
+            say(f"group {index + 1} of {count}: {text}")
+
+
+@contextmanager
+def _telling() -> Iterator[_Teller]:
+    with progress_bar("Measuring") as show:
+        yield _Teller(show)
+
+
+def _write(folder: Path, results: Results) -> str:
+    """Tables, plots and the JSON of all rows; the tables' text."""
+    from lfd_render.bench.plots import write_plots  # noqa: PLC0415 (keeps --help quick)
+    from lfd_render.bench.tables import report  # noqa: PLC0415
+    from lfd_render.display.files import replacing  # noqa: PLC0415
+
+    tables = report(results.rows, results.settings)
+    data = {"settings": results.settings, **_summary(results)}
+    for name, text in (("tables.md", tables), ("results.json", json_module.dumps(data, indent=1))):
+        with replacing(folder / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    try:
+        write_plots(folder, results.rows)
+    except UsageError as error:
+        warn(str(error))
+    return tables
+
+
+def _summary(results: Results) -> dict[str, Any]:
+    """Rows with their medians, and the ratio to the best rasteriser of each group."""
+    from lfd_render.bench.measure import best_mvr  # noqa: PLC0415 (keeps --help quick)
+
+    found = []
+    for rows in results.groups.values():
+        best = best_mvr(rows)
+        found += [_row(row, best) for row in rows]
+    return {"rows": found}
+
+
+def _row(row: Row, best: Row | None) -> dict[str, Any]:
+    data = dataclasses.asdict(row)
+    if row.valid:
+        data |= {"median_ms": row.median_ms, "spread": round(row.spread, 4)}
+    if row.valid and best:
+        data |= {"best_mvr": best.technique, "ratio": round(best.median_ms / row.median_ms, 4)}
+    return data
+
+
+def _samples(texts: Sequence[str] | None) -> tuple[tuple[int, int], ...]:
+    return tuple(parse_supersample(text) for text in texts or ())
+
+
+def _gold_size(text: str | None, default: tuple[int, int] | None) -> tuple[int, int] | None:
+    if text is None or text == "none":
+        return None if text else default
+    return parse_size("--gold-size", text)

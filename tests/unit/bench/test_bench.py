@@ -1,0 +1,223 @@
+"""What the bench does without a device: names, groups, checks of pictures, files, tables, plots."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lfd_render.bench.check import Verdict, against_peers, detail_share, stray_view
+from lfd_render.bench.contenders import USUAL, Contender, techniques
+from lfd_render.bench.measure import Row, best_mvr
+from lfd_render.bench.papers import TABLE_1, TABLE_2
+from lfd_render.bench.plots import write_plots
+from lfd_render.bench.results import LINES, Results
+from lfd_render.bench.suites import SUITES, Axes, groups_of, scene_source
+from lfd_render.bench.tables import report
+from lfd_render.display import DisplayProfile
+from lfd_render.errors import OutputError, UsageError
+from lfd_render.techniques.mvr import VARIANTS
+
+SETTINGS = {
+    "machine": {
+        "renderer": "llvmpipe", "driver": "4.5", "processor": "some", "cores": 2, "python": "3.11",
+        "version": "0.1", "commit": "abc", "date": "2026-01-01",
+    },
+    "effort": {"rounds": 3, "warm_ups": 1},
+}  # fmt: skip
+
+
+def row(technique: str, ms: float, **changes: object) -> Row:
+    made = Row(
+        group="aa builtin:car 48 1x1 default", suite="aa", scene="builtin:car", triangles=300_000,
+        views=48, supersample=(1, 1), contender=technique, technique=technique, aa="none",
+        frames_ms=[ms, 1.1 * ms, 0.9 * ms], view_rmse=5.0, view_ssim=0.9, view_size=(480, 360),
+        stages_ms={"transform": 1.0, "sample": 2.0, "splat": 3.0, "weave": 4.0}, device_bytes=10**8,
+    )  # fmt: skip
+    return dataclasses.replace(made, **changes)
+
+
+def test_names_of_techniques() -> None:
+    assert techniques(["mvr", "lfdpr:default", "lfdpr"]) == ("mvr:multipass", "lfdpr")
+    assert techniques(["mvr:all"]) == tuple(f"mvr:{name}" for name in VARIANTS)
+    assert techniques(USUAL) == USUAL
+    for wrong in ("mvr:no", "epr", "lfdpr:gold", ""):
+        with pytest.raises(UsageError, match=f"technique '{wrong}': unknown; use lfdpr"):
+            techniques([wrong])
+
+
+def test_a_filter_is_the_points_alone_in_the_papers_tables() -> None:
+    axes = Axes(techniques=("lfdpr", "mvr:multipass"), scenes=("builtin:car",))
+    (table_1,) = groups_of(["aa"], axes)
+    assert [c.name for c in table_1.contenders] == [
+        "lfdpr", "lfdpr, spatial AA", "lfdpr, angular AA", "lfdpr, both AA", "mvr:multipass",
+    ]  # fmt: skip
+    space, angle = groups_of(["supersample"], axes)
+    assert [c.aa for c in space.contenders] == ["spatial", "none"]
+    assert [c.aa for c in angle.contenders] == ["angular", "none"]
+    assert len({g.key for g in groups_of(list(SUITES), axes)}) == len(groups_of(list(SUITES), axes))
+    assert all(c.rasterises for g in groups_of(["mvr"], axes) for c in g.contenders)
+    with pytest.raises(UsageError, match="suite 'speed': unknown; use aa, supersample"):
+        groups_of(["speed"], axes)
+
+
+def test_scenes_take_what_they_are_not_given() -> None:
+    assert scene_source("builtin:car", 0, "textures=64") == "builtin:car"
+    assert scene_source("builtin:car", 5000) == "builtin:car?triangles=5000"
+    given = "builtin:gallery?triangles=9&textures=16"
+    assert scene_source(given, 5000, "textures=64") == given
+    assert scene_source("a.gltf", 5000, "textures=64") == "a.gltf"
+
+
+# ---- checks of pictures -----------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def view_map() -> np.ndarray:
+    return (
+        DisplayProfile.load("gavane-2024-tilted-4k").phase_tables().view_index_map(48)[:640, :960]
+    )
+
+
+def panel(view_map: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """A fine pattern in which depth shifts things by a pixel a view."""
+    y, x = np.indices(view_map.shape[:2])[..., None]
+    wave = np.sin((x + view_map) / 7.0) + np.cos(y / 11.0) + (x // 320)
+    return (110 + 30 * wave + rng.normal(0, 8, view_map.shape)).clip(0, 255).astype(np.uint8)
+
+
+def test_a_missing_and_a_stale_view_are_told_from_whole_frames(
+    view_map: np.ndarray, rng: np.random.Generator
+) -> None:
+    eia = panel(view_map, rng)
+    assert stray_view(eia, view_map) is None
+    for view in (0, 17, 47):
+        black = eia.copy()
+        black[view_map == view] = 0
+        assert stray_view(black, view_map) == view
+        stale = np.where(view_map == view, eia[:, ::-1], eia)
+        assert stray_view(stale, view_map) == view
+
+
+def test_half_as_many_rows_have_none_of_the_detail_and_noise_does_not_help(
+    rng: np.random.Generator,
+) -> None:
+    standard = rng.integers(0, 256, (40, 30, 3), dtype=np.uint8)
+    half = standard[::2].repeat(2, axis=0)
+    noisy = (standard + rng.normal(0, 20, standard.shape)).clip(0, 255).astype(np.uint8)
+    assert detail_share([standard], (standard,)) == 1.0
+    assert detail_share([half], (standard,)) == 0.0
+    assert detail_share([noisy], (standard,)) == pytest.approx(1.0, abs=0.1)
+    grey = np.full_like(standard, 90)
+    assert detail_share([standard], (grey,)) == 1.0  # a standard without detail asks for none
+
+
+def test_filtered_pictures_are_held_against_others() -> None:
+    whole, half = Verdict(None, 8.0, 0.9, 0.56), Verdict(None, 14.0, 0.8, 0.31)
+    assert against_peers(whole, [whole, half]).fault is None
+    assert "31 % of the detail" in (against_peers(half, [whole, half]).fault or "")
+
+
+def test_the_best_rasteriser_is_the_fastest_whose_picture_is_right() -> None:
+    rows = [row("lfdpr", 10), row("mvr:multipass", 100), row("mvr:loop-4", 40, fault="wrong"),
+            row("mvr:instanced", 60)]  # fmt: skip
+    best = best_mvr(rows)
+    assert best is not None
+    assert best.technique == "mvr:instanced"
+    assert best_mvr(rows[:1]) is None
+
+
+# ---- files ------------------------------------------------------------------------------------
+
+
+def test_results_go_on_where_they_stopped(tmp_path: Path) -> None:
+    results = Results(tmp_path, SETTINGS)
+    results.add([row("lfdpr", 10), row("mvr:multipass", 100, gap="why")])
+    other = [row("lfdpr", 20, group="another")]
+    results.add(other)
+    path = tmp_path / LINES
+    whole = path.read_text()
+    path.write_text(whole[:-25])  # cut off while the second group was written
+    later = json.loads(json.dumps(SETTINGS))
+    later["machine"] |= {"date": "2026-01-02", "commit": "def"}
+    again = Results(tmp_path, later)
+    assert list(again.groups) == ["aa builtin:car 48 1x1 default"]
+    assert again.rows == results.rows[:2]
+    assert again.settings["machine"]["commit"] == "abc"
+    again.add(other)
+    assert path.read_text() == whole
+
+
+def test_other_settings_are_refused_by_name(tmp_path: Path) -> None:
+    Results(tmp_path, SETTINGS)
+    changed = json.loads(json.dumps(SETTINGS))
+    changed["effort"]["rounds"] = 5
+    with pytest.raises(UsageError, match=r"measured with effort\.rounds 3, not 5; go on with the"):
+        Results(tmp_path, changed)
+    changed = json.loads(json.dumps(SETTINGS))
+    changed["machine"]["renderer"] = "H100"
+    with pytest.raises(UsageError, match=r"with machine\.renderer llvmpipe, not H100"):
+        Results(tmp_path, changed)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("no JSON\n", "line 1 has no settings"),
+        ('{"schema": "lfd-bench/0", "settings": {}}\n', "schema 'lfd-bench/0'"),
+        ("{head}\n[]\n", "line 2 is no group of rows"),
+        ('{head}\n{"rows": [{"group": "a"}]}\n', "line 2 is no group of rows"),
+    ],
+)
+def test_files_that_are_none_of_ours_are_refused(tmp_path: Path, text: str, said: str) -> None:
+    Results(tmp_path, SETTINGS)
+    path = tmp_path / LINES
+    made = text.replace("{head}", path.read_text().strip())
+    path.write_text(made)
+    with pytest.raises(OutputError, match=said):
+        Results(tmp_path, SETTINGS)
+    assert path.read_text() == made
+
+
+# ---- tables and plots -------------------------------------------------------------------------
+
+
+def test_tables_say_ratios_gaps_faults_and_the_papers_numbers() -> None:
+    rows = [
+        row("lfdpr:paper", 20.0, points=1_234_567, eia_rmse=7.0, eia_ssim=0.8),
+        row("mvr:multipass", 100.0, notation="P(N, →, □-□)"),
+        row("mvr:instanced-deferred", 50.0),
+        row("mvr:multiview-4", 1.0, gap="lacks GL_OVR_multiview2", frames_ms=[]),
+        row("lfdpr", 1.0, fault="shows nothing in view 3", frames_ms=[]),
+    ]
+    text = report(rows, SETTINGS)
+    line = next(line for line in text.splitlines() if "lfdpr:paper" in line)
+    assert "3.00 (1.23M)" in line
+    assert "| 2.50 × | 100 | 7.00 (5.00) | 0.800 (0.900) |" in line
+    assert "5.82 (8.07 ×; 6.72 ×)" in line  # the paper's ratio, and with one panel pass for both
+    assert "**mvr:instanced-deferred**" in text
+    assert "0.50 ×" in next(line for line in text.splitlines() if "P(N, →, □-□)" in line)
+    assert "- Missing: mvr:multiview-4: lacks GL_OVR_multiview2" in text
+    assert "- Missing: lfdpr: wrong picture, not timed: shows nothing in view 3" in text
+    assert "2026-01-01, commit abc: llvmpipe" in text
+
+
+def test_the_papers_own_speed_ups_follow_from_their_numbers() -> None:
+    for printed in (*TABLE_1.values(), *TABLE_2.values()):
+        parts = (printed.points_ms or 0.0) + printed.views_ms + printed.eia_ms
+        assert printed.total_ms == pytest.approx(parts, abs=0.03)
+
+
+def test_every_suite_has_a_table_and_sweeps_a_plot(tmp_path: Path) -> None:
+    rows = []
+    for suite in SUITES:
+        for size in (100_000, 1_000_000):
+            change = {"suite": suite, "group": f"{suite} {size}", "triangles": size}
+            rows += [row(Contender(n).technique, size / 1e3, **change) for n in USUAL[:4]]
+    text = report(rows, SETTINGS)
+    assert text.count("### ") == len(SUITES)
+    assert {p.name for p in write_plots(tmp_path, rows)} == {
+        "triangles.svg", "views.svg", "error.svg",
+    }  # fmt: skip
+    assert "multipass" in (tmp_path / "triangles.svg").read_text()
