@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import shutil
 import time
 import uuid
@@ -169,7 +170,7 @@ class SceneStore:
     def source(self, scene_id: str) -> Iterator[SceneSource]:
         """Where a scene is read from, which stays there meanwhile. Raises ProblemError 404."""
         if scene_id.startswith(PREFIX):
-            yield _builtin(scene_id)
+            yield _builtin(scene_id, self._settings)
             return
         scene = self.get(scene_id)
         self._leases[scene_id] += 1
@@ -232,11 +233,15 @@ class SceneStore:
         return SceneSource(scene_id, str(path), path.name, self._settings.limits)
 
 
-def _builtin(scene_id: str) -> SceneSource:
+def _builtin(scene_id: str, settings: Settings) -> SceneSource:
     try:
-        parse_builtin(scene_id)
+        _, options = parse_builtin(scene_id)
     except SceneError as error:
         raise ProblemError(404, f"scene '{scene_id[:100]}': {error}", "scene") from None
+    limits = {"triangles": settings.max_triangles, "textures": math.isqrt(settings.max_texels)}
+    for name, most in limits.items():
+        if options.get(name, 0) > most:
+            raise ProblemError(413, f"scene '{scene_id}': {name} is above {most}", "scene")
     return SceneSource(scene_id, scene_id, scene_id)
 
 

@@ -72,8 +72,8 @@ class Settings(BaseModel):
     max_scenes: Whole = Field(1000, description="Uploaded scenes that are kept at a time.")
     max_scenes_mb: Whole = Field(16384, description="Size of all uploaded scenes on disk.")
     max_displays: Whole = Field(1000, description="Displays that are kept besides those shipped.")
-    max_texels: Whole = Field(1 << 28, description="Pixels of all textures of an uploaded scene.")
-    max_triangles: Whole = Field(1 << 24, description="Triangles of an uploaded scene as drawn.")
+    max_texels: Whole = Field(1 << 28, description="Pixels of all textures of a scene.")
+    max_triangles: Whole = Field(1 << 24, description="Triangles of a scene as drawn.")
     max_view_pixels: Whole = Field(
         1 << 28, description="Pixels of all views of a picture together, times samples a pixel."
     )

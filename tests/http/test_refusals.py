@@ -85,6 +85,8 @@ def test_queries_are_checked(client: httpx.Client, query: str, status: int, fiel
         ("/v1/scenes/nothing/eia", 404),
         ("/v1/scenes/builtin:nothing/eia", 404),
         ("/v1/scenes/builtin:spheres%3Ftriangles=1/eia", 404),
+        ("/v1/scenes/builtin:spheres%3Ftriangles=6000/eia", 413),
+        ("/v1/scenes/builtin:gallery%3Ftriangles=1000&textures=4096/eia", 413),
         ("/v1/scenes/..%2F..%2Fetc/eia", 404),
         ("/v1/displays/nowhere", 404),
         ("/v1/displays/nowhere/map", 404),
