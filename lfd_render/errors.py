@@ -36,6 +36,10 @@ class GpuError(LfdError):
     """No usable OpenGL device, or the device reported an error."""
 
 
+class UnsupportedError(GpuError):
+    """The device lacks what an option asks for."""
+
+
 class ResourceError(LfdError):
     """The request needs more memory, texels or pixels than allowed."""
 
@@ -90,6 +94,7 @@ HTTP_STATUSES: dict[type[LfdError], int] = {
     SceneError: 422,
     ProfileError: 422,
     GpuError: 503,
+    UnsupportedError: 422,
     ResourceError: 413,
     BusyError: 429,
     DeadlineError: 504,

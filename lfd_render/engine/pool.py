@@ -22,6 +22,7 @@ from lfd_render.errors import (
     CancelledError,
     DeadlineError,
     GpuError,
+    LfdError,
     PoisonError,
     UnavailableError,
 )
@@ -444,6 +445,5 @@ def _error(failed: Failed) -> Exception:
     if failed.trace is not None:
         _log.error("job failed", extra={"trace": failed.trace})
         return InternalError(failed.arguments[0])
-    kind = getattr(lfd_render.errors, failed.kind)
-    error: Exception = kind(*failed.arguments)
-    return error
+    kind: type[LfdError] = getattr(lfd_render.errors, failed.kind, LfdError)
+    return kind(*failed.arguments)

@@ -22,7 +22,13 @@ from multiprocessing.connection import Connection
 from lfd_render.engine.bodies import send_body
 from lfd_render.engine.jobs import Cancel, Done, Failed, Forget, NotReady, Progress, Ready, Work
 from lfd_render.engine.workshop import Workshop
-from lfd_render.errors import CancelledError, LfdError, ResourceError, UsageError
+from lfd_render.errors import (
+    CancelledError,
+    GpuError,
+    LfdError,
+    ResourceError,
+    UnsupportedError,
+)
 from lfd_render.renderer import Renderer
 
 _TELLING_S = 0.2  # the least time between two words of progress
@@ -89,6 +95,8 @@ class Worker:
             result = self._workshop.make(work.job, progress)
         except Exception as error:
             self._pipe.send(self._failed(work, error))
+            if isinstance(error, GpuError) and not isinstance(error, UnsupportedError):
+                sys.exit(1)  # the context may be lost; the next process has a new one
         else:
             bare = replace(result, body=b"")
             self._pipe.send(Done(number, bare, self._workshop.holds(), len(result.body)))
@@ -117,7 +125,7 @@ def main() -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (config.memory_bytes, config.memory_bytes))
     try:
         renderer = Renderer(config.device)
-    except (LfdError, UsageError) as error:
+    except LfdError as error:
         with suppress(OSError):
             pipe.send(NotReady(str(error)))
         sys.exit(1)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from lfd_render.errors import GpuError
+from lfd_render.errors import UnsupportedError
 from lfd_render.gpu import raw as gl
 from lfd_render.gpu.memory import Owned, TextureArray
 
@@ -58,7 +58,7 @@ class PassTarget(Owned):
         )
         status = raw.glCheckNamedFramebufferStatus(self._name, gl.FRAMEBUFFER)
         if status != gl.FRAMEBUFFER_COMPLETE:
-            raise GpuError(
+            raise UnsupportedError(
                 f"framebuffer of {depth.count} layers: {device.name} calls it incomplete "
                 f"({status:#x}); use mvr 'multipass'"
             )

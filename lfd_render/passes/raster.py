@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import AbstractContextManager
 
-from lfd_render.errors import GpuError
+from lfd_render.errors import UnsupportedError
 from lfd_render.gpu import raw as gl
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.framebuffer import IndexedDraws, face_culling, rasterising
@@ -47,10 +47,10 @@ class Raster:
     ) -> None:
         """fragment: path of the shader. keep_depth: from each view to the next pass over it.
 
-        Raises GpuError where the device cannot draw so many views by the pipeline.
+        Raises UnsupportedError where the device cannot draw so many views by the pipeline.
         """
         if problem := pipeline.problem(device, parts.views, components=components):
-            raise GpuError(f"mvr '{pipeline.name}': {problem}")
+            raise UnsupportedError(f"mvr '{pipeline.name}': {problem}")
         self.parts = parts
         self.pipeline = pipeline
         self.passes = pipeline.passes(parts.views)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lfd_render.errors import GpuError
+from lfd_render.errors import UnsupportedError
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.framebuffer import EmptyTarget, IndexedDraws, conservative_raster
 from lfd_render.gpu.layout import CONSTANTS
@@ -25,10 +25,10 @@ class RasterCells(CellSource):
     def __init__(
         self, device: Device, scene: SceneBuffers, target: ViewTarget, sampling: Sampling
     ) -> None:
-        """Raises GpuError where stages before the fragment's have no storage blocks."""
+        """Raises UnsupportedError where stages before the fragment's have no storage blocks."""
         super().__init__(device, scene, target, sampling)
         if not device.info.geometry_storage:
-            raise GpuError(
+            raise UnsupportedError(
                 f"point source 'raster': the geometry stage of {device.name} has too few storage "
                 "blocks; use compute, which makes the same points"
             )

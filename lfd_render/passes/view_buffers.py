@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from lfd_render.errors import GpuError
+from lfd_render.errors import UnsupportedError
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.layout import CONSTANTS
 from lfd_render.gpu.memory import Buffer
@@ -26,12 +26,12 @@ def choose_winners(device: Device, wanted: str, *, ownable: bool = True) -> str:
 
     auto: 64-bit atomics where there are some; else owned rows on software devices, where they take
     0.4 to 0.6 of two passes' time (docs/performance.md); else two passes. ownable: points come in
-    rows that all views share. Raises GpuError for 64-bit atomics where there are none.
+    rows that all views share. Raises UnsupportedError for 64-bit atomics where there are none.
     """
     assert wanted in WINNERS
     has_int64 = INT64_ATOMICS in device.info.extensions
     if wanted == "int64" and not has_int64:
-        raise GpuError(
+        raise UnsupportedError(
             f"splat 'int64': {device.name} lacks {INT64_ATOMICS}; use two-pass, owned or auto, "
             "which give the same picture"
         )

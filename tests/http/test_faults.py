@@ -15,7 +15,7 @@ import httpx
 import pytest
 
 from .conftest import GLTF, PATH, PROFILE, Server, Start
-from .faults.sitecustomize import BREAK, CRASH, EAT, HANG, SLOW, SWELL
+from .faults.sitecustomize import BREAK, CRASH, EAT, HANG, LOSE, SLOW, SWELL
 
 pytestmark = pytest.mark.needs("gl")
 FAULTS = Path(__file__).parent / "faults"
@@ -141,6 +141,16 @@ def test_a_process_that_grows_too_large_is_ended(client: httpx.Client) -> None:
     before = metric(client, "lfd_process_restarts_total")
     problem(eia(client, scene(7), seed=SWELL), 422)
     assert metric(client, "lfd_process_restarts_total") - before == 2
+
+
+def test_a_process_whose_device_fails_is_replaced(client: httpx.Client) -> None:
+    before = metric(client, "lfd_process_restarts_total")
+    told = eia(client, scene(8), seed=LOSE)
+    assert int(told.headers["retry-after"]) >= 1
+    problem(told, 503)
+    until(lambda: metric(client, "lfd_process_restarts_total") == before + 1)
+    until(lambda: client.get("/readyz").json()["processes_ready"] == 2)
+    assert eia(client, scene(8)).status_code == 200
 
 
 def test_what_nobody_expected_is_logged_not_told(server: Server, client: httpx.Client) -> None:

@@ -6,7 +6,7 @@ import signal
 import sys
 import time
 
-CRASH, HANG, EAT, SLOW, BREAK, SWELL = range(900, 906)
+CRASH, HANG, EAT, SLOW, BREAK, SWELL, LOSE = range(900, 907)
 SLOW_S = 1.0
 SWELL_BYTES = 1 << 30
 
@@ -14,6 +14,7 @@ if "lfd_render.engine.worker" in sys.orig_argv:
     import numpy as np
 
     from lfd_render.engine import workshop
+    from lfd_render.errors import GpuError
 
     whole = workshop.Workshop.make
 
@@ -29,6 +30,8 @@ if "lfd_render.engine.worker" in sys.orig_argv:
             self.swollen = mmap.mmap(-1, SWELL_BYTES)
             for _ in range(SWELL_BYTES >> 20):
                 self.swollen.write(bytes(1 << 20))
+        elif seed == LOSE:
+            raise GpuError("planted: the context is lost")
         elif seed == BREAK:
             raise ZeroDivisionError("planted")
         elif seed == SLOW:
