@@ -56,7 +56,7 @@ class Contender:
     def problem(self, device: Device, eyes: int) -> str | None:
         """Why the device cannot run it; None if it can."""
         if not self.rasterises:
-            return None
+            return None  # or it says so itself, as rivals from outside do
         return problem(device, self.technique.partition(":")[2], eyes)
 
 

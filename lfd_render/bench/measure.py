@@ -12,16 +12,18 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lfd_render.bench.check import Standard, Verdict, against_peers, verdict
 from lfd_render.bench.contenders import Contender
-from lfd_render.bench.gold import alone, chosen_views, gold_standard
+from lfd_render.bench.gold import LEAST_SEEN, alone, chosen_views, gold_standard
+from lfd_render.bench.rivals import RIVALS, Outside
 from lfd_render.bench.suites import Group
 from lfd_render.display import Camera, DisplayProfile
-from lfd_render.errors import GpuError, LfdError, ResourceError
+from lfd_render.errors import GpuError, LfdError, ResourceError, UsageError
 from lfd_render.gpu.device import Device
 from lfd_render.panel.eia import Eia
 from lfd_render.quality import rmse, ssim_luma
@@ -32,6 +34,7 @@ from lfd_render.scene import Scene
 Pixels = NDArray[np.uint8]
 Told = Callable[[str], None]
 _ELSEWHERE_RAD = 0.35  # how far the frame before the one that is judged is turned away
+_MOST_MISSED = 0.05  # of what a standard shows; its edges are finer than a rival's
 _PANEL_STAGES = ("average", "encode_srgb", "weave")
 _POINT_STAGES = ("transform", "sample")
 
@@ -70,6 +73,7 @@ class Row:
     fault: str | None = None
     frames_ms: list[float] = field(default_factory=list)
     stages_ms: dict[str, float] = field(default_factory=dict)
+    leaves_out: str = ""
     compile_ms: float = 0.0
     points: int = 0
     device_bytes: int = 0
@@ -117,21 +121,32 @@ def _naming_gaps(row: Row) -> Iterator[None]:
     """What keeps one contender from its work is its gap, and no one else's."""
     try:
         yield
-    except (ResourceError, GpuError) as error:
+    except (ResourceError, GpuError, UsageError) as error:
         row.gap = str(error)
     except MemoryError as error:
         row.gap = f"out of memory: {error}"
 
 
+class Frames(Protocol):
+    """What is timed: a frame by a camera, its milliseconds."""
+
+    def frame(self, camera: Camera) -> float:
+        """Render it."""
+        ...
+
+    def close(self) -> None:
+        """Free what frames need."""
+
+
 @dataclass
 class _Running:
-    """A contender at work."""
+    """A contender at work; without verdict and panel image where it is a rival from outside."""
 
     row: Row
     renderer: Renderer
-    stage: Stage
-    verdict: Verdict
-    eia: Pixels
+    stage: Frames
+    verdict: Verdict | None = None
+    eia: Pixels | None = None
 
 
 class Bench:
@@ -162,18 +177,19 @@ class Bench:
         try:
             for row, contender in zip(rows, group.contenders, strict=True):
                 self._told(f"{group.scene}: preparing {row.contender}")
-                found = self._start(group, row, contender, scene=scene, camera=camera,
-                                    standard=standard)  # fmt: skip
+                start = self._start_outside if contender.technique in RIVALS else self._start
+                found = start(group, row, contender, scene=scene, camera=camera, standard=standard)
                 if found is not None:
                     running.append(found)
             _judge_together(running)
             for found in running:
-                if gold is not None:
+                if gold is not None and found.eia is not None:
                     found.row.eia_rmse = rmse(gold, found.eia)
                     found.row.eia_ssim = ssim_luma(gold, found.eia)
             self._run(group, [found for found in running if not found.row.fault], camera)
         finally:
             for found in running:
+                found.stage.close()
                 found.renderer.close()
         return rows
 
@@ -262,6 +278,34 @@ class Bench:
         renderer.close()
         return None
 
+    def _start_outside(
+        self,
+        group: Group,
+        row: Row,
+        contender: Contender,
+        *,
+        scene: Scene,
+        camera: Camera,
+        standard: Standard,
+    ) -> _Running | None:
+        """Stage a rival from outside, and see that it shows what the standard shows."""
+        size = group.view_size or upright_size(self._display, group.views)
+        with _naming_gaps(row):
+            begun = time.perf_counter()
+            outside = Outside(contender.technique, scene, self._display, group.views, size)
+            row.compile_ms = 1000 * (time.perf_counter() - begun)
+            row.leaves_out, row.view_size = outside.leaves_out, size
+            outside.frame(camera)
+            assert outside.shown is not None
+            missed = [
+                float(np.mean(~outside.shown[view][picture.max(axis=-1) > LEAST_SEEN]))
+                for view, picture in zip(standard.views, standard.pictures, strict=True)
+            ]
+            if max(missed) > _MOST_MISSED:
+                row.fault = f"misses {100 * max(missed):.0f} % of what the standard shows"
+            return _Running(row, Renderer(self._device), outside)
+        return None
+
     def _run(self, group: Group, running: list[_Running], camera: Camera) -> None:
         """A B A B: frame by frame, all contenders by the same camera."""
         count = self._effort.warm_ups + self._effort.rounds
@@ -277,7 +321,7 @@ class Bench:
                         found.row.frames_ms.append(round(ms, 3))
         for found in running:
             with _naming_gaps(found.row):
-                if found.row.gap is None:
+                if found.row.gap is None and isinstance(found.stage, Stage):
                     timings = found.stage.read().report["timings_ms"]
                     done_once = ("frame", "read", "upload", "compile", "prefilter")
                     found.row.stages_ms = {
@@ -288,7 +332,9 @@ class Bench:
 def _judge_together(running: list[_Running]) -> None:
     """Verdicts once all are known: detail is compared between pictures under the same filter."""
     for found in running:
-        peers = [other.verdict for other in running if other.row.aa == found.row.aa]
+        if found.verdict is None:
+            continue
+        peers = [o.verdict for o in running if o.verdict and o.row.aa == found.row.aa]
         final = against_peers(found.verdict, peers)
         row = found.row
         row.fault, row.view_rmse, row.view_ssim = final.fault, final.rmse, final.ssim

@@ -59,6 +59,7 @@ class Axes:
     main_views: int = 48
     main_triangles: int = 0
     main_size: tuple[int, int] | None = None
+    rivals: tuple[str, ...] = ()
 
 
 def scene_source(scene: str, triangles: int, extra: str = "") -> str:
@@ -150,6 +151,16 @@ def _mvr(axes: Axes) -> list[Group]:
     ]
 
 
+def _rivals(axes: Axes) -> list[Group]:
+    """Programs from outside, which render views of one size and weave none."""
+    contenders = (*_plain(axes), *(Contender(name) for name in axes.rivals))
+    return [
+        Group("rivals", _main(axes, s), axes.main_views, (1, 1), contenders,
+              axes.main_size or (480, 360))
+        for s in axes.scenes
+    ]  # fmt: skip
+
+
 SUITES: dict[str, Callable[[Axes], list[Group]]] = {
     "aa": _filtered,
     "supersample": _supersampled,
@@ -157,6 +168,7 @@ SUITES: dict[str, Callable[[Axes], list[Group]]] = {
     "views": _views,
     "error": _error,
     "mvr": _mvr,
+    "rivals": _rivals,
 }
 
 

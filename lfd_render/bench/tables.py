@@ -187,6 +187,22 @@ def _by_size(found: list[list[Row]]) -> str:
     return "\n".join(lines)
 
 
+def _outside(found: list[list[Row]]) -> str:
+    """Programs from outside, against LFDPR's whole frame."""
+    lines = ["| Scene | Method | frame, ms | of lfdpr's | leaves out |", "|---" * 5 + "|"]
+    for rows in found:
+        ours = next((r for r in rows if r.technique == "lfdpr" and r.valid), None)
+        for row in rows:
+            if row.valid:
+                share = f"{row.median_ms / ours.median_ms:.2f} ×" if ours else ""
+                lines.append(
+                    f"| {scene_name(row)} | {row.contender} | "
+                    f"{_ms(row.median_ms)} ± {100 * row.spread:.0f} % | {share} | "
+                    f"{row.leaves_out} |"
+                )
+    return "\n".join(lines)
+
+
 def _catalogue(found: list[list[Row]]) -> str:
     """All rasterisers, ranked in each group; then the columns that 004's tables have."""
     lines = ["| Scene | views | Pipeline | | frame, ms | of plain | memory, MB |", "|---" * 7 + "|"]
@@ -243,4 +259,5 @@ _TABLES: dict[str, tuple[str, Callable[[list[list[Row]]], str]]] = {
     "views": ("Time against views", lambda g: _swept(g, "views", lambda r: str(r.views))),
     "error": ("Speed against error (as Fig. 6 of EPR)", _by_size),
     "mvr": ("The catalogue of multi-view rasterisation (Tables 2 to 4 of it)", _catalogue),
+    "rivals": ("Programs from outside, same scene, eyes, view size and machine", _outside),
 }

@@ -43,7 +43,9 @@ def bench(
     ] = False,
     suite: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", help="aa, supersample, triangles, views, error or mvr."),
+        typer.Option(
+            metavar="NAME", help="aa, supersample, triangles, views, error, mvr or rivals."
+        ),
     ] = None,
     scene: Annotated[
         list[str] | None, typer.Option(metavar="SCENE", help="Instead of the four bench scenes.")
@@ -51,6 +53,13 @@ def bench(
     technique: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME", help="lfdpr, lfdpr:paper, mvr:VARIANT or mvr:all."),
+    ] = None,
+    rivals: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,…",
+            help="Also suite rivals: embree, mitsuba, vtk, each a package to be installed by name.",
+        ),
     ] = None,
     aa: Annotated[list[options.Filter] | None, typer.Option(help="Filters of suite aa.")] = None,
     supersample: Annotated[
@@ -92,6 +101,7 @@ def bench(
 
     from lfd_render.bench.contenders import USUAL, techniques  # noqa: PLC0415 (keeps --help quick)
     from lfd_render.bench.measure import Effort  # noqa: PLC0415
+    from lfd_render.bench.rivals import check_names  # noqa: PLC0415
     from lfd_render.bench.suites import FILTERS, Axes, groups_of  # noqa: PLC0415
     from lfd_render.display import DisplayProfile  # noqa: PLC0415
 
@@ -106,6 +116,7 @@ def bench(
         view_sizes=((240, 180), (480, 360)) if quick else default.view_sizes,
         extra="textures=256" if quick else "",
         main_views=48,
+        rivals=check_names(rivals.split(",")) if rivals else (),
         main_size=parse_size("--view-size", view_size) or ((240, 180) if quick else None),
         main_triangles=(50_000 if quick else 0) if scene_triangles is None else scene_triangles,
     )
@@ -117,7 +128,10 @@ def bench(
         samples=samples or (4 if quick else default_effort.samples),
         gold_size=_gold_size(gold_size, None if quick else default_effort.gold_size),
     )
-    groups = groups_of(suite or (_QUICK_SUITES if quick else _SUITES), axes)
+    suites = list(suite or (_QUICK_SUITES if quick else _SUITES))
+    if axes.rivals and "rivals" not in suites:
+        suites.append("rivals")
+    groups = groups_of(suites, axes)
     profile = DisplayProfile.load(display)
     make_folder(folder)
     results, interrupted = _measure(folder, groups, axes, effort, profile=profile, device=device)

@@ -2,11 +2,14 @@
 
 import dataclasses
 import json
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from lfd_render.bench import rivals
 from lfd_render.bench.check import Verdict, against_peers, detail_share, stray_view
 from lfd_render.bench.contenders import USUAL, Contender, techniques
 from lfd_render.bench.measure import Row, best_mvr
@@ -15,8 +18,10 @@ from lfd_render.bench.plots import write_plots
 from lfd_render.bench.results import LINES, Results
 from lfd_render.bench.suites import SUITES, Axes, groups_of, scene_source
 from lfd_render.bench.tables import report
-from lfd_render.display import DisplayProfile
-from lfd_render.errors import OutputError, UsageError
+from lfd_render.display import DisplayProfile, Rig
+from lfd_render.errors import GpuError, OutputError, UsageError
+from lfd_render.renderer import camera_for
+from lfd_render.scene import Scene
 from lfd_render.techniques.mvr import VARIANTS
 
 SETTINGS = {
@@ -221,3 +226,59 @@ def test_every_suite_has_a_table_and_sweeps_a_plot(tmp_path: Path) -> None:
         "triangles.svg", "views.svg", "error.svg",
     }  # fmt: skip
     assert "multipass" in (tmp_path / "triangles.svg").read_text()
+
+
+# ---- programs from outside --------------------------------------------------------------------
+
+
+class Box:
+    """A rival that shows the bounds of what it is given, in every view alike."""
+
+    leaves_out = "all but a box"
+
+    def __init__(self, rig: Rig, size: tuple[int, int]) -> None:
+        self._views, self._size, self._panel_mm = rig.views, size, rig.panel_mm
+
+    def render(self, p_display: np.ndarray) -> np.ndarray:
+        width, height = self._size
+        low, high = p_display.min(axis=(0, 1))[:2], p_display.max(axis=(0, 1))[:2]
+        x = (np.arange(width) + 0.5) / width * self._panel_mm[0] - self._panel_mm[0] / 2
+        y = self._panel_mm[1] / 2 - (np.arange(height) + 0.5) / height * self._panel_mm[1]
+        shown = ((x > low[0]) & (x < high[0]))[None, :] & ((y > low[1]) & (y < high[1]))[:, None]
+        return np.repeat(shown[None], self._views, axis=0)
+
+
+def test_a_rival_gets_the_scene_in_front_of_the_display(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(rivals.RIVALS, "box", Box)
+    # In this process, for a new one would not know of the box.
+    monkeypatch.setattr(rivals, "ProcessPoolExecutor", lambda *_: ThreadPoolExecutor(1))
+    display = DisplayProfile.load("gavane-2024-tilted-4k")
+    scene = Scene.load("builtin:car?triangles=20000")
+    outside = rivals.Outside("box", scene, display, 3, (64, 48))
+    camera = camera_for(scene, display)
+    assert outside.leaves_out == "all but a box"
+    assert outside.frame(camera) > 0
+    assert outside.shown is not None
+    assert outside.shown.shape == (3, 48, 64)
+    assert 0.3 < outside.shown.mean() < 0.9
+    before = outside.shown.any(axis=(0, 1)).sum()
+    outside.frame(camera.turned(0.6))
+    assert outside.shown.any(axis=(0, 1)).sum() != before
+    outside.close()
+
+
+def test_a_missing_rival_and_one_that_fails_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    display = DisplayProfile.load("gavane-2024-tilted-4k")
+    scene = Scene.load("builtin:car?triangles=20000")
+    monkeypatch.setattr(rivals, "ProcessPoolExecutor", lambda *_: ThreadPoolExecutor(1))
+    monkeypatch.setitem(sys.modules, "embreex.rtcore_scene", None)
+    with pytest.raises(UsageError, match="needs embreex: pip install embreex"):
+        rivals.Outside("embree", scene, display, 3, (64, 48))
+    monkeypatch.setitem(rivals.RIVALS, "box", Box)
+    monkeypatch.setattr(Box, "render", lambda self, p_display: 1 / 0)
+    outside = rivals.Outside("box", scene, display, 3, (64, 48))
+    with pytest.raises(GpuError, match="fails: ZeroDivisionError"):
+        outside.frame(camera_for(scene, display))
+    outside.close()
+    with pytest.raises(UsageError, match="rival 'blender': unknown; use embree, mitsuba, vtk"):
+        rivals.check_names(["blender"])
