@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from lfd_render.errors import UsageError
+from lfd_render.errors import OutputError, UsageError
 from lfd_render.panel.formats import write_exr
 from lfd_render.panel.png import png_chunks
 
@@ -56,11 +56,16 @@ def encoded(
 
 
 def exr(linear: NDArray[np.float16], text: Mapping[str, str]) -> bytes:
-    """OpenEXR of scene-linear half floats [y, x, 3]."""
-    with tempfile.TemporaryDirectory(prefix="lfd-render-") as folder:
-        file = Path(folder) / "picture.exr"  # the library writes files alone
-        write_exr(file, linear, text)
-        return file.read_bytes()
+    """OpenEXR of scene-linear half floats [y, x, 3]. Raises OutputError without a place for it."""
+    try:
+        with tempfile.TemporaryDirectory(prefix="lfd-render-") as folder:
+            file = Path(folder) / "picture.exr"  # the library writes files alone
+            write_exr(file, linear, text)
+            return file.read_bytes()
+    except OSError as error:
+        raise OutputError(
+            f"image/x-exr: no place for a file on its way: {error.strerror}"
+        ) from error
 
 
 def zipped(files: Iterable[tuple[str, bytes]]) -> bytes:

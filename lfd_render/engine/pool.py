@@ -35,6 +35,7 @@ _MOST_KILLS = 4  # of processes at a job by others, before it is given up
 _PATIENCE_S = 1.0  # how long the first in the queue lets others go where their scene is warm
 _QUIET_S = 2.0  # nobody asks for so long before the only process turns to the background
 _MOST_WAIT_S = 60.0  # between later ones
+_LACK_S = 1.0  # between tries to start a process while there are no file descriptors or memory
 _MOST_FAILED_STARTS = 3  # in a row, until which a new process is tried at once
 
 
@@ -344,7 +345,7 @@ class Pool:
         if self._draining and not self._waiting and ticket is None:
             return
         if self._failed_starts < _MOST_FAILED_STARTS:
-            self._spawn()
+            self._spawn_if_possible()
         else:
             wait_s = min(2.0**self._failed_starts / 4, _MOST_WAIT_S)
             asyncio.get_running_loop().call_later(wait_s, self._spawn_later)
@@ -360,7 +361,15 @@ class Pool:
 
     def _spawn_later(self) -> None:
         if not self._draining and len(self._busy) < self.settings.processes:
+            self._spawn_if_possible()
+
+    def _spawn_if_possible(self) -> None:
+        """Start a process, or try again later where the machine lacks what it takes."""
+        try:
             self._spawn()
+        except OSError as error:
+            _log.error("no render process can be started", extra={"why": str(error)})
+            asyncio.get_running_loop().call_later(_LACK_S, self._spawn_later)
 
     def _mourn(self, process: RenderProcess, ticket: _Ticket) -> None:
         """Decide what becomes of a dead process's job."""

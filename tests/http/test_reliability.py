@@ -1,0 +1,275 @@
+"""Under too much, too long, too little room, and at its end, the server loses nothing."""
+
+import asyncio
+import json
+import os
+import resource
+import signal
+import socket
+import subprocess
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+from .conftest import GLTF, PATH, PROFILE, Server, Start
+
+pytestmark = pytest.mark.needs("gl")
+CHEAP = Path(__file__).parent / "cheap"
+MIB = 1 << 20
+Scaled = Callable[[int, int], int]
+Measured = Callable[[str, str], None]
+
+
+@pytest.fixture
+def takes_20_ms(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LFD_CHEAP_MS", "20")
+
+
+def until(condition: Callable[[], bool]) -> None:
+    late = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < late, "it never came"
+        time.sleep(0.02)
+
+
+def idle(client: httpx.Client) -> bool:
+    ready = client.get("/readyz").json()
+    return bool(ready["running"] == ready["queued"] == 0)
+
+
+def place(client: httpx.Client) -> None:
+    client.put("/v1/displays/small", json=PROFILE).raise_for_status()
+
+
+@pytest.mark.shows("4 x overload: only 200, or 429 with Retry-After; health stays quick")
+def test_overload(start: Start, takes_20_ms: None, scaled: Scaled, measured: Measured) -> None:
+    seconds, capacity = scaled(600, 4), 2 / 0.02
+    found: Counter[str] = Counter()
+    health: list[float] = []
+
+    async def ask(client: httpx.AsyncClient, number: int) -> None:
+        answer = await client.get(f"{PATH}/eia", params={"display": "small", "yaw": number / 100})
+        assert answer.status_code == 200 or int(answer.headers["retry-after"]) > 0
+        found[str(answer.status_code)] += 1
+
+    async def probe(client: httpx.AsyncClient) -> None:
+        while True:
+            started = time.perf_counter()
+            (await client.get("/livez")).raise_for_status()
+            health.append(1000 * (time.perf_counter() - started))
+            await asyncio.sleep(0.02)
+
+    async def overload(url: str) -> float:
+        limits = httpx.Limits(max_connections=1000, max_keepalive_connections=1000)
+        options: Any = {"base_url": url, "timeout": 60, "trust_env": False, "limits": limits}
+        async with httpx.AsyncClient(**options) as client, httpx.AsyncClient(**options) as other:
+            probing = asyncio.create_task(probe(other))
+            started = time.monotonic()
+            async with asyncio.TaskGroup() as group:
+                for number in range(round(4 * capacity * seconds)):
+                    await asyncio.sleep(started + number / (4 * capacity) - time.monotonic())
+                    group.create_task(ask(client, number))
+            probing.cancel()
+            return time.monotonic() - started
+
+    with start("--processes", "2", python_path=CHEAP, queue=16) as server:
+        with server.client() as client:
+            place(client)
+        took = asyncio.run(overload(server.url))
+    assert set(found) == {"200", "429"}
+    assert found.total() == round(4 * capacity * seconds)  # none was lost
+    measured("4 x overload", f"{found['200']} x 200, {found['429']} x 429, none lost")
+    measured("goodput", f"{found['200'] / took / capacity:.0%} of what sleeping processes could do")
+    measured("/livez under it", f"p99 {np.percentile(health, 99):.0f} ms")
+
+
+@pytest.mark.shows("1,000 clients that go: all called off, no place leaked")
+def test_clients_that_go(start: Start, takes_20_ms: None, scaled: Scaled) -> None:
+    count = scaled(1000, 150)
+    with start("--processes", "2", python_path=CHEAP, queue=64) as server:
+        host, port = "127.0.0.1", httpx.URL(server.url).port
+        with server.client() as client:
+            place(client)
+
+            def go(number: int) -> None:
+                path = ("eia", "stream", "look")[number % 3]
+                with socket.create_connection((host, port)) as raw:
+                    query = f"display=small&yaw={number}"
+                    head = f"GET {PATH}/{path}?{query} HTTP/1.1\r\nHost: localhost\r\n\r\n"
+                    raw.sendall(head.encode())
+                    time.sleep(number % 7 / 200)
+
+            with ThreadPoolExecutor(8) as threads:
+                list(threads.map(go, range(count)))
+            until(lambda: idle(client))
+            assert "lfd_streams 0.0" in client.get("/metrics").text
+            assert client.get(f"{PATH}/eia?display=small").status_code == 200
+            sockets = [link for link in links(server.process.pid) if link.startswith("socket:")]
+            # Its own and this client's, those to the render processes, and no other.
+            assert len(sockets) < 16
+
+
+def links(pid: int) -> Iterator[str]:
+    for file in Path(f"/proc/{pid}/fd").iterdir():
+        try:
+            yield os.readlink(file)
+        except OSError:
+            continue
+
+
+@pytest.fixture
+def tiny_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 2 MiB."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    made = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", folder], capture_output=True, check=False
+    )
+    if made.returncode:
+        pytest.skip(f"[mount] may not mount a file system: {made.stderr.decode().strip()}")
+    yield folder
+    subprocess.run(["umount", "--lazy", folder], check=True)
+
+
+@pytest.mark.shows("disk full: 507, recovers, no partial file")
+def test_a_full_disk(
+    start: Start, tiny_disk: Path, triangle: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TMPDIR", str(tiny_disk))  # where EXR files pass through
+    exr = {"Accept": "image/x-exr"}
+    large = triangle[:-1] + b" " * 3 * MIB + b"}"
+    raw = {"Prefer": "respond-async", "Accept": "application/octet-stream"}
+    with start(data_dir=tiny_disk) as server, server.client() as client:
+        place(client)
+        assert client.post("/v1/scenes", content=large, headers=GLTF).status_code == 507
+        until(lambda: not list((tiny_disk / "scenes").iterdir()))
+        assert client.post("/v1/scenes", content=triangle, headers=GLTF).status_code == 201
+        assert client.get(f"{PATH}/eia?display=small", headers=exr).status_code == 200
+        filler = tiny_disk / "filler"
+        with filler.open("wb") as file, pytest.raises(OSError, match="No space"):
+            file.write(bytes(4 * MIB))
+        full = client.put("/v1/displays/other", json=PROFILE)
+        assert (full.status_code, full.headers["content-type"]) == (507, "application/problem+json")
+        assert client.get("/v1/displays/other").status_code == 404
+        later = client.get(f"{PATH}/eia?display=small", headers=raw).headers["location"]
+        until(lambda: client.get(later).json()["state"] == "failed")
+        assert client.get(f"{later}/result").status_code == 507
+        assert client.get(f"{PATH}/eia?display=small&yaw=2", headers=exr).status_code == 507
+        assert client.get(f"{PATH}/eia?display=small").status_code == 200  # nothing is kept of it
+        filler.unlink()
+        assert client.put("/v1/displays/other", json=PROFILE).status_code == 201
+        again = client.get(f"{PATH}/eia?display=small&yaw=1", headers=raw).headers["location"]
+        until(lambda: client.get(again).json()["state"] == "done")
+        assert len(client.get(f"{again}/result").content) == 3 * 192 * 108
+        names = {path.name for path in tiny_disk.rglob("[!.]*") if path.is_file()}
+        assert names == {"small.json", "other.json", "scene.json", "scene.gltf", "0"}
+
+
+def test_no_file_descriptors(start: Start, triangle: bytes) -> None:
+    """Uploads are refused, and a picture whose process cannot be replaced is made when it can."""
+    with start("--processes", "1") as server, server.client() as client:
+        place(client)
+        pid = server.process.pid
+        most, hard = resource.prlimit(pid, resource.RLIMIT_NOFILE)
+        taken = 1 + max(int(file.name) for file in Path(f"/proc/{pid}/fd").iterdir())
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (taken, hard))
+        full = client.post("/v1/scenes", content=triangle, headers=GLTF)
+        assert (full.status_code, full.headers["retry-after"]) == (503, "5")
+        with ThreadPoolExecutor() as threads:
+            making = threads.submit(client.get, f"{PATH}/eia?display=small")
+            time.sleep(1)
+            resource.prlimit(pid, resource.RLIMIT_NOFILE, (most, hard))
+            assert making.result().status_code == 200
+        assert client.post("/v1/scenes", content=triangle, headers=GLTF).status_code == 201
+
+
+def grown(server: Server) -> int:
+    """Bytes by which the render process grows over many frames of many scenes."""
+    frames, scenes = 10_000, 100
+    with server.client() as client:
+        place(client)
+
+        def resident() -> int:
+            (pid,) = server.render_pids()
+            return int(Path(f"/proc/{pid}/statm").read_text("ascii").split()[1]) * 4096
+
+        def render(count: int) -> None:
+            for frame in range(count):
+                turn = frame * scenes // frames
+                scene = f"builtin:spheres%3Ftriangles={1000 + turn % scenes}"
+                query = f"display=small&yaw={frame}"
+                client.get(f"/v1/scenes/{scene}/eia?{query}").raise_for_status()
+
+        render(frames)
+        before = resident()
+        render(frames)
+        return resident() - before
+
+
+CACHELESS = {"scene_cache_mb": 64, "frame_cache_mb": 0, "answer_cache_mb": 0}
+
+
+@pytest.fixture
+def many(full_counts: bool) -> None:
+    """It takes some hundred frames until the allocator has settled, and minutes to see growth."""
+    if not full_counts:
+        pytest.skip("[LFD_FULL=1] is for full counts alone")
+
+
+@pytest.mark.shows("leak: 10,000 frames over 100 scenes; a planted leak is caught")
+def test_frames_leave_no_memory(start: Start, many: None, measured: Measured) -> None:
+    with start("--processes", "1", **CACHELESS) as server:
+        growth = grown(server)
+    measured("growth of a render process", f"{growth / MIB:.2f} MiB")
+    assert growth <= MIB
+
+
+def test_a_planted_leak_is_caught(
+    start: Start, many: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LFD_CHEAP_LEAK", "300")
+    with start("--processes", "1", python_path=CHEAP, **CACHELESS) as server:
+        assert grown(server) > MIB
+
+
+@pytest.mark.shows("SIGTERM under load: none dropped")
+def test_the_end_under_load(
+    start: Start, takes_20_ms: None, scaled: Scaled, measured: Measured
+) -> None:
+    found: Counter[str] = Counter()
+    for _ in range(scaled(20, 2)):
+        with start("--processes", "2", python_path=CHEAP) as server:
+            with server.client() as client:
+                place(client)
+
+            def load(number: int, server: Server = server) -> None:
+                turn = 0
+                while True:
+                    turn += 1
+                    with server.client() as own:
+                        url = f"{PATH}/eia?display=small&yaw={number + turn / 1000}"
+                        try:
+                            found[str(own.get(url).status_code)] += 1
+                        except httpx.ConnectError:
+                            return  # it no longer listens
+                        except httpx.TransportError as error:
+                            found[type(error).__name__] += 1
+
+            threads = [threading.Thread(target=load, args=(n,)) for n in range(8)]
+            for thread in threads:
+                thread.start()
+            time.sleep(0.5)
+            server.process.send_signal(signal.SIGTERM)
+            for thread in threads:
+                thread.join(60)
+                assert not thread.is_alive()
+    measured("requests while the server was told to end", json.dumps(found))
+    assert set(found) == {"200"}
