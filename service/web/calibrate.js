@@ -127,7 +127,7 @@ function change(number, value) {
   current = number;
   changes = { ...changes, [number.name]: value };
   for (const input of inputs(number)) {
-    if (input !== document.activeElement) input.value = Number(value.toPrecision(10));
+    if (input !== document.activeElement) input.value = Number(value.toPrecision(7));
   }
   pattern.want(null);
 }
@@ -151,7 +151,7 @@ function fill() {
     if (number.name in changes) continue;
     for (const input of inputs(number)) {
       const value = number.of(displays.profile);
-      if (input !== document.activeElement) input.value = Number(value.toPrecision(10));
+      if (input !== document.activeElement) input.value = Number(value.toPrecision(7));
     }
   }
 }

@@ -177,11 +177,11 @@ export class Displays {
     const shipped = this.#summaries.find(({ name }) => name === this.name)?.shipped ?? true;
     const remove = document.querySelector("#display-delete");
     if (remove) remove.hidden = shipped;
-    for (const link of document.querySelectorAll("nav a:not([href^=docs])")) {
+    for (const link of document.querySelectorAll("nav a")) {
       link.search = this.name ? `?display=${this.name}` : "";
     }
     const facts = [
-      `${this.size.join(" × ")} px`,
+      `${[...this.size].join(" × ")} px`,
       `${viewing.views} views`,
       `${viewing.cone_deg}° cone`,
       `${viewing.distance_mm} mm away`,

@@ -1,7 +1,9 @@
 // What the page says: problems, with the field at fault marked, and short notes.
 
 const region = document.querySelector("#problem");
+const NOTE_MS = 8000;
 let marked = null;
+let passing;
 
 /** Show a problem until the next picture, and mark the input that its field names. */
 export function complain(error, again) {
@@ -53,6 +55,8 @@ export async function attempt(work, control) {
 export function note(text) {
   const line = document.querySelector("#note");
   line.textContent = text;
+  clearTimeout(passing);
+  passing = setTimeout(() => (line.textContent = ""), NOTE_MS);
 }
 
 /** The input of the field at fault, or of the field of it that the message begins with. */

@@ -55,8 +55,15 @@ export class Scenes {
     const [name, count] = (id ?? "").split("?triangles=");
     const known = [...this.#select.options].some((option) => option.value === name);
     this.#select.value = known ? name : `${BUILT_IN}gallery`;
-    if (known && name.startsWith(BUILT_IN)) this.#triangles.value = count ?? "";
+    if (known && name.startsWith(BUILT_IN)) this.#count(count ?? "");
     this.#show();
+  }
+
+  /** Choose a number of triangles, be it none of those on offer. */
+  #count(number) {
+    const offered = [...this.#triangles.options].some((option) => option.value === number);
+    if (!offered) this.#triangles.add(new Option(Number(number).toLocaleString("en"), number));
+    this.#triangles.value = number;
   }
 
   /** Read what the scene holds, once a picture has shown that it can be read. */
@@ -138,14 +145,18 @@ export class Scenes {
 
   #dropping() {
     const over = (on) => document.body.classList.toggle("dropping", on);
-    addEventListener("dragover", (event) => {
-      event.preventDefault();
-      over(true);
-    });
+    for (const kind of ["dragenter", "dragover"]) {
+      addEventListener(kind, (event) => {
+        if (!event.dataTransfer.types.includes("Files")) return;
+        event.preventDefault();
+        over(true);
+      });
+    }
     addEventListener("dragleave", (event) => {
       if (!event.relatedTarget) over(false);
     });
     addEventListener("drop", async (event) => {
+      if (!event.dataTransfer.types.includes("Files")) return;
       event.preventDefault();
       over(false);
       const entries = [...event.dataTransfer.items].map((item) => item.webkitGetAsEntry?.());

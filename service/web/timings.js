@@ -7,6 +7,7 @@ export function showTimings(element, spans, wholeMs) {
   const known = STAGES.filter((name) => spans[name] >= 0.05).map((name) => [name, spans[name]]);
   const sum = known.reduce((ms, [, span]) => ms + span, 0);
   const all = [...known, ["transfer", Math.max(0, wholeMs - sum)]];
+  const kept = known.length ? "" : ", kept by the server from before";
   const bar = document.createElement("div");
   bar.className = "bar";
   const legend = document.createElement("dl");
@@ -25,7 +26,7 @@ export function showTimings(element, spans, wholeMs) {
     legend.append(pair);
   }
   const whole = document.createElement("p");
-  whole.textContent = `${readable(wholeMs)} in all`;
+  whole.textContent = `${readable(wholeMs)} in all${kept}`;
   element.replaceChildren(whole, bar, legend);
 }
 

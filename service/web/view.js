@@ -139,7 +139,7 @@ async function showPanel(signal) {
   else if (mode === "stereo") drawPair(image, $("#pair").value);
   else draw(image);
   const warnings = response.headers.get("LFD-Warnings");
-  note(warnings ?? "");
+  if (warnings) note(warnings);
   said(where(mode));
   outlet.update();
   scenes.look().catch((error) => complain(error));
@@ -376,7 +376,7 @@ function modes() {
 
 async function start() {
   const given = new URLSearchParams(location.search);
-  const ready = await (await fetch("readyz")).json();
+  const ready = await (await ask("readyz")).json();
   $("#device").textContent = ready.renderers[0] ?? "no device";
   if (ready.software) frameMs = Infinity; // until it has shown better
   await displays.start(given.get("display"));

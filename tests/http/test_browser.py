@@ -35,16 +35,6 @@ _PIXELS = """canvas => {
   const text = Array.from(data, (code) => String.fromCharCode(code)).join("");
   return [canvas.width, canvas.height, btoa(text)];
 }"""
-_DROP = """([name, text]) => {
-  const bytes = Uint8Array.from(atob(text), c => c.charCodeAt(0));
-  const transfer = new DataTransfer();
-  transfer.items.add(new File([bytes], name));
-  for (const kind of ["dragover", "drop"]) {
-    document.body.dispatchEvent(
-      new DragEvent(kind, { dataTransfer: transfer, bubbles: true, cancelable: true }));
-  }
-}"""
-
 Pixels = NDArray[np.uint8]
 Open = Callable[..., Page]
 Launch = Callable[..., AbstractContextManager[Browser]]
@@ -193,6 +183,16 @@ def red(picture: Pixels) -> tuple[float, float]:
     return float(x.mean()) / picture.shape[1], float(y.mean()) / picture.shape[0]
 
 
+def drop(page: Page, path: Path) -> None:
+    """Drop a file or folder as from a desktop."""
+    devtools = page.context.new_cdp_session(page)
+    data = {"items": [], "files": [str(path)], "dragOperationsMask": 1}
+    for kind in ("dragEnter", "dragOver", "drop"):
+        event = {"type": kind, "x": 300, "y": 300, "data": data}
+        devtools.send("Input.dispatchDragEvent", event)
+        expect(page.locator("body.dropping")).to_have_count(int(kind != "drop"))
+
+
 def drag(page: Page, dx: float, dy: float, *, shift: bool = False) -> None:
     box = page.locator("#stage").bounding_box()
     assert box
@@ -215,9 +215,12 @@ def test_the_first_picture_is_the_virtual_panels(visit: Open, client: httpx.Clie
     expect(page.locator("#device")).not_to_be_empty()
 
 
-def test_a_dropped_model_is_orbited_and_seen_from_aside(visit: Open, client: httpx.Client) -> None:
+def test_a_dropped_model_is_orbited_and_seen_from_aside(
+    visit: Open, client: httpx.Client, tmp_path: Path
+) -> None:
     page = visit()
-    page.evaluate(_DROP, ["squares.glb", base64.b64encode(two_squares()).decode()])
+    (tmp_path / "squares.glb").write_bytes(two_squares())
+    drop(page, tmp_path / "squares.glb")
     expect(page.locator("#scene option:checked")).to_have_text("squares.glb")
     rest(page)
     x, y = red(shown(page))
@@ -236,6 +239,24 @@ def test_a_dropped_model_is_orbited_and_seen_from_aside(visit: Open, client: htt
     expect(page.locator("#said")).to_contain_text("to the left")
     assert right + 0.005 < x < red(shown(page))[0] - 0.005
     assert "yaw" not in placed(page)
+
+
+def test_a_dropped_folder_asks_which_file_is_the_scene(visit: Open, tmp_path: Path) -> None:
+    page = visit()
+    parts = tmp_path / "model" / "parts"
+    parts.mkdir(parents=True)
+    shape = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nusemtl red\nf 1 2 3\n"
+    (tmp_path / "model" / "one.obj").write_text("mtllib parts/one.mtl\n" + shape)
+    (tmp_path / "model" / "other.obj").write_text(shape)
+    (parts / "one.mtl").write_text("newmtl red\nKd 1 0 0\n")
+    drop(page, tmp_path / "model")
+    page.get_by_role("dialog").get_by_role("combobox").select_option("model/one.obj")
+    page.get_by_role("button", name="Take it").click()
+    expect(page.locator("#scene option:checked")).to_have_text("one.obj")
+    rest(page)
+    red(shown(page))  # the material lies in the folder's folder
+    page.locator("#scene-delete").click()
+    expect(page.locator("#scene option", has_text="one.obj")).to_have_count(0)
 
 
 def test_keys_do_what_the_mouse_does(visit: Open, client: httpx.Client) -> None:
@@ -322,6 +343,9 @@ def test_downloads_are_the_apis_bytes(visit: Open, client: httpx.Client) -> None
     page.locator("#stage").focus()
     page.keyboard.press("ArrowRight")
     rest(page)
+    line = page.locator("#shell").text_content() or ""
+    address = line.removeprefix("curl -o eia.png ").strip("'")
+    assert client.get(address).content == picture(client, "eia", **placed(page))
     for button, kind in (("Panel image", "eia"), ("Quilt", "quilt"), ("Views", "views")):
         with page.expect_download() as told:
             page.get_by_role("button", name=button, exact=True).click()
@@ -393,7 +417,7 @@ def test_the_panels_own_window_follows(visit: Open, client: httpx.Client) -> Non
     assert np.array_equal(shown(panel, "canvas"), turned)
 
 
-def test_mistakes_are_shown_with_their_field(visit: Open) -> None:
+def test_mistakes_are_shown_with_their_field(visit: Open, tmp_path: Path) -> None:
     page = visit()
     page.get_by_text("Edit the profile").click()
     field = page.locator("[name='lens.lens_count']")
@@ -404,7 +428,8 @@ def test_mistakes_are_shown_with_their_field(visit: Open) -> None:
     field.fill("24.3")
     expect(problem).to_be_hidden()
     expect(field).not_to_have_attribute("aria-invalid", "true")
-    page.evaluate(_DROP, ["broken.glb", base64.b64encode(b"glTF, or not").decode()])
+    (tmp_path / "broken.glb").write_bytes(b"glTF, or not")
+    drop(page, tmp_path / "broken.glb")
     expect(problem).to_contain_text("broken.glb")
 
 
