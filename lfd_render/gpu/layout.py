@@ -192,6 +192,19 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("mat4", "diffuse_blue"),
         ("vec4", "turn"),  # cosine, sine of the turn about +y; intensity; the last level's number
     ),
+    # A slice track's shared shading: its first cell | steps between cells << CELL_BITS, the column
+    # of the first, and the eye of the view on whose columns they lie, in columns.
+    "Track": (
+        ("uint", "cells"),
+        ("float", "from"),
+        ("float", "steps_per_column"),
+        ("float", "eye"),
+    ),
+    # Cells of all tracks, and the most since the host last looked.
+    "SharedWork": (
+        ("uint", "cells"),
+        ("uint", "most_cells"),
+    ),
     # Counts of the list of blocks to shade: the first three words dispatch.
     "BlockWork": (
         ("uint", "groups_x"),
@@ -208,6 +221,9 @@ CONSTANTS: dict[str, int] = {
     "NO_TRIANGLE": 0xFFFFFFFF,  # the word of a view pixel that shows the background
     "DOUBLE_SIDED": 1 << 16,
     "MOST_CELLS": 2048,  # of a triangle's lattice along a side, as the point-sampling view is large
+    "TRACK_WORD": 1 << 31,  # bit: the word of a view pixel names a slice track
+    "CELL_BITS": 22,  # of a track's first cell; the rest of the word counts steps
+    "MOST_STEPS": (1 << 10) - 1,
     "UNLIT": 1,  # flag of a material
     "STUDIO": 1,  # kinds of environment
     "PICTURE": 2,

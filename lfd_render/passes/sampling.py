@@ -16,7 +16,7 @@ LATTICES = ("rows", "paper")
 POINT_SOURCES = ("compute", "raster")
 DENSITIES = ("lfd", "isotropic")
 CULLINGS = ("exact", "vertices")
-SHADE_PLACES = ("ray", "point")
+SHADE_PLACES = ("ray", "shared", "point")
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-import numpy as np
-
 from lfd_render.gpu.device import Device
-from lfd_render.gpu.layout import dtype, lod_constants
+from lfd_render.gpu.layout import lod_constants
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
+from lfd_render.passes.blocks import BLOCK, GROUP_BLOCKS, Blocks
 from lfd_render.passes.items import GROUPS_ACROSS
 from lfd_render.passes.placement import Placement, gl_matrix
 from lfd_render.passes.sampling import DEFAULT_SAMPLING, Sampling
@@ -41,10 +40,6 @@ class NoPoints:
 
 Sampled = tuple[Batch, Sized]
 
-BLOCK = 16  # columns of a view shaded together
-GROUP_BLOCKS = 4  # blocks of a work group
-_LIST_GROUP = 64  # local_size_x of shade/blocks.comp
-
 
 class Shade:
     """Winners, ViewTarget → ViewTarget.images: each visible pixel is shaded once, where its ray
@@ -72,15 +67,9 @@ class Shade:
             **sampling.constants(),
         }
         self._scene = scene
-        self._list = Kernel(device, "shade/blocks.comp", constants)
+        self._blocks = Blocks(device, target, word_stride)
         self._opaque = Kernel(device, "shade/ray.comp", constants)
         self._blend = Kernel(device, "shade/blend.comp", constants)
-        self._row_blocks = -(-target.grid.columns // BLOCK)
-        lines = target.band_rows * target.rig.views
-        self._blocks = Buffer(device, "shading blocks", 4 * self._row_blocks * lines)
-        self._work = Buffer(device, "shading blocks", dtype("BlockWork").itemsize)
-        self._no_work = np.zeros(1, dtype("BlockWork"))
-        self._no_work["groups_z"] = 1
 
     def opaque(
         self, batches: Sequence[Sampled], band: Band, views: Winners, placement: Placement
@@ -108,16 +97,11 @@ class Shade:
     ) -> None:
         turn_from_display = gl_matrix(placement.turn_from_display)
         for batch, points in batches:
-            shared = {
-                "FrameBlock": band.frame(batch),
-                "Words": views.words,
-                "Blocks": self._blocks,
-                "BlockWorkBlock": self._work,
-            }
-            self._list_blocks(shared, band)
+            shown = self._blocks(batch, band, views)
             kernel.set(
                 {
-                    **shared,
+                    "FrameBlock": band.frame(batch),
+                    **shown,
                     **batch.geometry(),
                     **batch.attributes(),
                     "WorldNormals": batch.world_normals,
@@ -128,28 +112,12 @@ class Shade:
                     "RowOffsets": band.target.row_offsets,
                     "PointSizes": points.sizes,
                 },
-                {"turn_from_display": turn_from_display, "row_blocks": self._row_blocks},
+                {"turn_from_display": turn_from_display},
                 {**self._scene.samplers(), **self._scene.lighting.samplers()},
             )
-            kernel.run_indirect(self._work)
-
-    def _list_blocks(self, shared: dict[str, Buffer], band: Band) -> None:
-        """List the blocks that show the batch whose Frame block is in `shared`."""
-        block_count = self._row_blocks * band.target.rig.views * band.rows
-        groups = -(-block_count // _LIST_GROUP)
-        across = min(groups, GROUPS_ACROSS)
-        self._work.write(self._no_work)
-        self._list.set(
-            shared,
-            {
-                "block_count": block_count,
-                "row_blocks": self._row_blocks,
-                "groups_across": across,
-            },
-        )
-        self._list.run((across, -(-groups // across), 1))
+            kernel.run_indirect(self._blocks.work)
 
     def release(self) -> None:
         """Free kernels and the list."""
-        for owner in (self._list, self._opaque, self._blend, self._blocks, self._work):
+        for owner in (self._blocks, self._opaque, self._blend):
             owner.release()

@@ -50,7 +50,9 @@ class Winners(Protocol):
 
 
 class ViewBuffers(Winners, Protocol):
-    """Winners, and how near they are."""
+    """Winners, and how near they are: each depth the last of `word_stride` words of `depths`."""
+
+    depths: Buffer
 
     def blocks(self) -> dict[str, Buffer]:
         """What splatting writes, by block name."""
@@ -100,7 +102,7 @@ class PackedViewBuffers:
 
     def __init__(self, device: Device, target: ViewTarget) -> None:
         self._pixels = target.band_pixels
-        self.words = Buffer(device, "view buffers", 8 * target.band_pixels)
+        self.words = self.depths = Buffer(device, "view buffers", 8 * target.band_pixels)
         self._forget = Kernel(device, "splat/forget.comp")
 
     def blocks(self) -> dict[str, Buffer]:

@@ -244,15 +244,18 @@ class Renderer:
         technique.begin(
             Placement(camera.display_from_world(display.size_mm), choice.background), clock
         )
-        technique.warm_up(clock)  # which also makes room for the points of this very placement
-        for index, band in enumerate(target.bands):
-            progress(index / len(target.bands))
-            technique.render(band, clock)
-            found = average(band) if averaged else band.view_images()
-            rows = slice(*found.shown)
-            for view in range(plan.views):
-                encode(found.images, view, choice.exposure)
-                pictures[view, rows] = encode.read()[: rows.stop - rows.start]
+        technique.warm_up(clock)
+        complete = False
+        while not complete:
+            for index, band in enumerate(target.bands):
+                progress(index / len(target.bands))
+                technique.render(band, clock)
+                found = average(band) if averaged else band.view_images()
+                rows = slice(*found.shown)
+                for view in range(plan.views):
+                    encode(found.images, view, choice.exposure)
+                    pictures[view, rows] = encode.read()[: rows.stop - rows.start]
+            complete = technique.complete()
         self.device.check()
         for owner in (technique, encode, average):
             owner.release()

@@ -19,6 +19,7 @@ from lfd_render.passes.raster_cells import RasterCells
 from lfd_render.passes.sample import PointCloud, Sample
 from lfd_render.passes.sampling import DEFAULT_SAMPLING, Points, PointSource, Sampling, Splatter
 from lfd_render.passes.shade import Shade
+from lfd_render.passes.share import SharedShade
 from lfd_render.passes.splat import Splat, view_lanes
 from lfd_render.passes.splat_cells import SplatCells
 from lfd_render.passes.transform import Transform
@@ -77,9 +78,11 @@ class Lfdpr:
             )
         )
         self._views = make_view_buffers(device, target, int64=int64)
-        self._shade = Shade(
-            device, scene, target, self._views.word_stride, lod=lod, sampling=sampling
-        )
+        stride = self._views.word_stride
+        self._shade = Shade(device, scene, target, stride, lod=lod, sampling=sampling)
+        self._shared: SharedShade | None = None
+        if sampling.shade == "shared":
+            self._shared = SharedShade(device, scene, target, stride, lod=lod, sampling=sampling)
         self._points: list[Points] = [self._source.allocate(batch) for batch in scene.batches]
         self._make_counter = partial(
             CountPairs, device, scene, target, sampling, general=general, lod=lod
@@ -123,7 +126,7 @@ class Lfdpr:
             self._views.clear()
             self._find_winners(solid, band)
         with clock.stage("shade"):
-            self._shade.opaque(solid, band, self._views, self._placement)
+            (self._shared or self._shade).opaque(solid, band, self._views, self._placement)
         blended = [pair for pair in self._batches() if pair[0].alpha_mode == "blend"]
         if blended:
             with clock.stage("blend"):
@@ -141,7 +144,10 @@ class Lfdpr:
 
     def complete(self) -> bool:
         """Whether there was room for all points since the last call; if not, there is now."""
-        enlarged = [self._source.fit(points) for points in self._points] + [self._splat.fit()]
+        enlarged = [self._source.fit(points) for points in self._points] + [
+            self._splat.fit(),
+            self._shade.fit(),
+        ]
         return not any(enlarged)
 
     def count_points(self) -> int:
@@ -194,5 +200,7 @@ class Lfdpr:
         self._source.release()
         self._splat.release()
         self._shade.release()
+        if self._shared:
+            self._shared.release()
         self._views.release()
         self.target.release()

@@ -1,13 +1,9 @@
 // glTF 2.0 metallic-roughness (specification, appendix B) under the environment and the scene's lights.
 // One function serves every technique; it returns scene-linear radiance.
 
-#include "common/environment.glsl"
-#include "common/lights.glsl"
+#include "common/gloss.glsl"
 #include "common/textures.glsl"
 
-const float PI = 3.14159265359;
-const vec3 MOST_RADIANCE = vec3(65504.0);  // what half floats hold
-const float SMALLEST_ALPHA = 0.002;  // keeps the specular peak of a mirror finite
 const float UV_ROUNDING = 5e-7;  // of texture coordinates, relative: what a file's own arithmetic leaves
 const float LEAST_SINE = 2e-6;  // between changes of texture coordinates that are not one line: 32 roundings
 
@@ -53,25 +49,6 @@ vec3 shading_normal(Surface surface) {
     return surface.back ? -normal : normal;
 }
 
-// Environment BRDF: scale and bias of the specular colour, a polynomial fit by Karis (2014, "Physically
-// based shading on mobile").
-vec2 environment_brdf(float roughness, float n_dot_v) {
-    vec4 r = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
-    float a = min(r.x * r.x, exp2(-9.28 * n_dot_v)) * r.x + r.y;
-    return vec2(-1.04, 1.04) * a + r.zw;
-}
-
-// Cook-Torrance with GGX, Smith's height-correlated masking and Schlick's Fresnel (glTF, appendix B.3).
-vec3 specular_brdf(vec3 f0, float alpha, float n_dot_l, float n_dot_v, float n_dot_h, float v_dot_h) {
-    float a2 = alpha * alpha;
-    float peak = n_dot_h * n_dot_h * (a2 - 1.0) + 1.0;
-    float distribution = a2 / (PI * peak * peak);
-    float masking = 0.5 / (n_dot_l * sqrt(n_dot_v * n_dot_v * (1.0 - a2) + a2)
-                         + n_dot_v * sqrt(n_dot_l * n_dot_l * (1.0 - a2) + a2));
-    vec3 fresnel = f0 + (1.0 - f0) * pow(1.0 - v_dot_h, 5.0);
-    return fresnel * distribution * masking;
-}
-
 // Base colour with its texture and the vertices' colours, linear, alpha included.
 vec4 base_color_of(Surface surface, int rule) {
     vec4 color = material_base_color(surface.material) * surface.color;
@@ -106,49 +83,25 @@ vec3 emitted(Surface surface) {
     return radiance;
 }
 
-// A point of a surface as light meets it.
-struct Facet {
-    vec3 normal, view;  // unit
-    vec3 f0, albedo;
-    float alpha, n_dot_v;
-};
-
-// Diffuse and specular reflectance of light from a unit direction.
-vec3 reflectance(Facet facet, vec3 to_light, float n_dot_l) {
-    vec3 halfway = normalize(facet.view + to_light);
-    float n_dot_h = clamp(dot(facet.normal, halfway), 0.0, 1.0), v_dot_h = clamp(dot(facet.view, halfway), 0.0, 1.0);
-    return facet.albedo / PI + specular_brdf(facet.f0, facet.alpha, n_dot_l, facet.n_dot_v, n_dot_h, v_dot_h);
+Matte matte_of(Surface surface) {
+    vec4 base_color = base_color_of(surface, LOD_RULE);
+    if ((materials[surface.material].flags & UNLIT) != 0u)
+        return Matte(base_color.rgb, vec3(0.0, 0.0, 1.0), vec3(0.0), 1.0, 0.0, false, base_color.a);
+    vec3 orm = occlusion_roughness_metallic(surface), normal = shading_normal(surface);
+    vec3 albedo = base_color.rgb * (1.0 - orm.b);
+    vec3 arriving = orm.r * environment_diffuse(normal);
+    if (LIGHTS == 0 && ENVIRONMENT == STUDIO)
+        arriving += scaled(KEY_IRRADIANCE * (max(0.0, dot(normal, turned(KEY_DIRECTION, environment.turn.y))) / PI));
+    for (int i = 0; i < LIGHTS; i++) {
+        Arrival light = light_arriving(i, surface.place);
+        arriving += light.irradiance * (max(0.0, dot(normal, light.direction)) / PI);
+    }
+    return Matte(albedo * arriving + emitted(surface), normal, mix(vec3(0.04), base_color.rgb, orm.b), orm.g, orm.r, true, base_color.a);
 }
 
 // Radiance towards the eye and opacity.
 vec4 shade(Surface surface) {
-    vec4 base_color_alpha = base_color_of(surface, LOD_RULE);
-    vec3 base_color = base_color_alpha.rgb;
-    if ((materials[surface.material].flags & UNLIT) != 0u) return base_color_alpha;
-    vec3 orm = occlusion_roughness_metallic(surface);
-    float roughness = orm.g, metallic = orm.b;
-
-    vec3 normal = shading_normal(surface);
-    Facet facet;
-    facet.normal = normal;
-    facet.view = normalize(surface.to_eye);
-    facet.n_dot_v = clamp(abs(dot(normal, facet.view)), 1e-4, 1.0);
-    facet.f0 = mix(vec3(0.04), base_color, metallic);
-    facet.albedo = base_color * (1.0 - metallic);
-    facet.alpha = max(SMALLEST_ALPHA, roughness * roughness);
-
-    vec2 brdf = environment_brdf(roughness, facet.n_dot_v);
-    vec3 radiance = orm.r * (facet.albedo * environment_diffuse(normal)
-        + max(facet.f0 * brdf.x + brdf.y, 0.0) * environment_radiance(reflect(-facet.view, normal), roughness));
-    if (LIGHTS == 0 && ENVIRONMENT == STUDIO) {
-        vec3 to_key = turned(KEY_DIRECTION, environment.turn.y);
-        float n_dot_l = dot(normal, to_key);
-        if (n_dot_l > 0.0) radiance += scaled(KEY_IRRADIANCE * n_dot_l * reflectance(facet, to_key, n_dot_l));
-    }
-    for (int i = 0; i < LIGHTS; i++) {
-        Arrival light = light_arriving(i, surface.place);
-        float n_dot_l = dot(normal, light.direction);
-        if (n_dot_l > 0.0) radiance += light.irradiance * n_dot_l * reflectance(facet, light.direction, n_dot_l);
-    }
-    return vec4(min(radiance + emitted(surface), MOST_RADIANCE), base_color_alpha.a);
+    Matte matte = matte_of(surface);
+    vec3 gloss = gloss_of(matte, normalize(surface.to_eye), surface.place);
+    return vec4(min(matte.radiance + gloss, MOST_RADIANCE), matte.opacity);
 }

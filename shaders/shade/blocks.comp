@@ -1,6 +1,6 @@
 // The blocks of BLOCK columns that show triangles of a batch: a software device runs all that a branch
 // skips, and backgrounds are large. The order of the list varies; what it leads to does not.
-// In: Words. Out: Blocks, BlockWork.
+// In: Words. Out: Blocks (row of the band << 22 | view << 12 | block of the row), BlockWork, and which triangles are shown.
 
 layout(local_size_x = 64) in;
 
@@ -10,6 +10,7 @@ layout(local_size_x = 64) in;
 layout(std430) readonly restrict buffer Words { uint words[]; };
 layout(std430) writeonly restrict buffer Blocks { uint blocks[]; };
 layout(std430) restrict buffer BlockWorkBlock { BlockWork block_work; };
+layout(std430) writeonly restrict buffer TriangleTracks { uint triangle_tracks[]; };  // where MARK_TRIANGLES is 1
 
 uniform uint block_count;   // of the band
 uniform uint row_blocks;    // of one row of one view
@@ -22,11 +23,15 @@ void main() {
     uint end = min(first + BLOCK, uint(frame.columns));
     bool any_here = false;
     // Background is no triangle of any batch, since ids end far below it.
-    for (uint column = first; column < end; column++)
-        any_here = any_here || words[WORD_STRIDE * (line * uint(frame.columns) + column)] - frame.triangle_base < frame.triangles;
+    for (uint column = first; column < end; column++) {
+        uint triangle = words[WORD_STRIDE * (line * uint(frame.columns) + column)] - frame.triangle_base;
+        if (triangle >= frame.triangles) continue;
+        any_here = true;
+        if (MARK_TRIANGLES != 0) triangle_tracks[triangle] = 1u;
+    }
     if (!any_here) return;
     uint place = atomicAdd(block_work.blocks, 1u), group = place / GROUP_BLOCKS;
-    blocks[place] = block;
+    blocks[place] = (line / uint(frame.views)) << 22 | (line % uint(frame.views)) << 12 | block % row_blocks;
     atomicMax(block_work.groups_x, min(group + 1u, GROUPS_ACROSS));
     atomicMax(block_work.groups_y, group / GROUPS_ACROSS + 1u);
 }

@@ -6,6 +6,7 @@
 layout(local_size_x = BLOCK, local_size_y = GROUP_BLOCKS) in;
 
 #include "shade/surface.glsl"
+#include "shade/visible.glsl"
 
 layout(rgba16f, binding = 0) writeonly restrict uniform image2DArray view_images;
 

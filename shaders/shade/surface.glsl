@@ -1,44 +1,17 @@
-// The surface that a visible view pixel shows, found from the pixel's word, and the list of blocks of
-// pixels that show any.
+// The surface where an eye's ray meets a triangle.
 
 #include "common/triangles.glsl"
 #include "common/surface.glsl"
 #include "common/vertices.glsl"
 #include "common/normals.glsl"
 #include "common/shading.glsl"
-#include "layout/BlockWork"
 
-// Winners, each WORD_STRIDE words from the one before.
-layout(std430) readonly restrict buffer Words { uint words[]; };
-layout(std430) readonly restrict buffer Blocks { uint blocks[]; };
-layout(std430) readonly restrict buffer BlockWorkBlock { BlockWork block_work; };
 layout(std430) readonly restrict buffer Eyes { float eyes[]; };
 layout(std430) readonly restrict buffer RowOffsets { float row_offsets[]; };
 
 #include "common/multiview.glsl"
 
 uniform mat4 turn_from_display;  // see Placement
-uniform uint row_blocks;
-
-// A pixel of the views and what it shows. Nothing: background, or a triangle of another batch.
-struct Visible {
-    ivec3 pixel;  // column, row of the band, view
-    bool nothing;
-    uint triangle;
-};
-
-Visible visible_pixel() {
-    uint place = (gl_WorkGroupID.y * GROUPS_ACROSS + gl_WorkGroupID.x) * GROUP_BLOCKS + gl_LocalInvocationID.y;
-    uint block = place < block_work.blocks ? blocks[place] : 0u, line = block / row_blocks;
-    int column = int((block % row_blocks) * BLOCK + gl_LocalInvocationID.x);
-    Visible seen;
-    seen.pixel = ivec3(column, int(line) / frame.views, int(line) % frame.views);
-    seen.nothing = place >= block_work.blocks || column >= frame.columns;
-    if (seen.nothing) return seen;
-    seen.triangle = words[WORD_STRIDE * (line * uint(frame.columns) + uint(column))] - frame.triangle_base;
-    seen.nothing = seen.triangle >= frame.triangles;
-    return seen;
-}
 
 // From vertex a to b and c. What is the same at all three stands still, exactly.
 mat2 sides(mat3x2 uv) {
@@ -50,14 +23,8 @@ bool on_a_line(mat3x2 uv, mat2 sides) {
     return abs(determinant(sides)) <= UV_ROUNDING * max(most.x, most.y) * (lengths.x + lengths.y);
 }
 
-Surface surface_at(uint triangle, int view, int row, int column) {
+Surface surface_of(uint triangle, float eye_mm, Plane plane, Hit hit) {
     uvec4 corners = triangles[triangle];
-    vec3 a = display_positions[corners.x].xyz;
-    vec3 b = display_positions[corners.y].xyz;
-    vec3 c = display_positions[corners.z].xyz;
-    float eye_mm = eyes[view] * frame.column_mm;
-    Plane plane = triangle_plane(a, b, c);
-    Hit hit = shaded_hit(triangle, a, b, c, plane, eye_mm, row, column);
     mat3x2 uv0 = mat3x2(tex_coords[corners.x], tex_coords[corners.y], tex_coords[corners.z]);
     mat3x2 uv1 = mat3x2(vertex_uv1(corners.x), vertex_uv1(corners.y), vertex_uv1(corners.z));
     uint facing = draws[corners.w].facing;
@@ -78,4 +45,14 @@ Surface surface_at(uint triangle, int view, int row, int column) {
     surface.material = draws[corners.w].material;
     surface.back = (eye_side(plane, eye_mm) < 0.0) != ((facing & FACING_MIRRORED) != 0u);
     return surface;
+}
+
+Surface surface_at(uint triangle, int view, int row, int column) {
+    uvec4 corners = triangles[triangle];
+    vec3 a = display_positions[corners.x].xyz;
+    vec3 b = display_positions[corners.y].xyz;
+    vec3 c = display_positions[corners.z].xyz;
+    float eye_mm = eyes[view] * frame.column_mm;
+    Plane plane = triangle_plane(a, b, c);
+    return surface_of(triangle, eye_mm, plane, shaded_hit(triangle, a, b, c, plane, eye_mm, row, column));
 }

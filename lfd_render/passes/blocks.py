@@ -1,0 +1,71 @@
+"""The blocks of view pixels that show a batch."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lfd_render.gpu.device import Device
+from lfd_render.gpu.layout import dtype
+from lfd_render.gpu.memory import Buffer
+from lfd_render.gpu.programs import Kernel
+from lfd_render.gpu.scene_buffers import Batch
+from lfd_render.passes.items import GROUPS_ACROSS
+from lfd_render.passes.view_buffers import ViewBuffers
+from lfd_render.passes.view_target import Band, ViewTarget
+
+BLOCK = 16  # columns of a view that go together
+GROUP_BLOCKS = 4  # blocks of a work group
+_LIST_GROUP = 64  # local_size_x of shade/blocks.comp
+
+
+class Blocks:
+    """ViewBuffers → the list of blocks that show a batch, and `work`, which dispatches over it."""
+
+    def __init__(
+        self, device: Device, target: ViewTarget, word_stride: int, *, mark: bool = False
+    ) -> None:
+        """mark: also tell which triangles are shown."""
+        constants = {
+            "BLOCK": BLOCK,
+            "GROUP_BLOCKS": GROUP_BLOCKS,
+            "WORD_STRIDE": word_stride,
+            "GROUPS_ACROSS": GROUPS_ACROSS,
+            "MARK_TRIANGLES": int(mark),
+        }
+        self._list = Kernel(device, "shade/blocks.comp", constants)
+        self._row_blocks = -(-target.grid.columns // BLOCK)
+        lines = target.band_rows * target.rig.views
+        self._blocks = Buffer(device, "shading blocks", 4 * self._row_blocks * lines)
+        self.work = Buffer(device, "shading blocks", dtype("BlockWork").itemsize)
+        self._no_work = np.zeros(1, dtype("BlockWork"))
+        self._no_work["groups_z"] = 1
+
+    def __call__(
+        self, batch: Batch, band: Band, views: ViewBuffers, shown: Buffer | None = None
+    ) -> dict[str, Buffer]:
+        """List the blocks; what shaders read of them and the pixels' words, by block name. shown:
+        uint32 [triangle] that becomes 1 where a pixel shows it."""
+        listed = {"Words": views.words, "Blocks": self._blocks, "BlockWorkBlock": self.work}
+        block_count = self._row_blocks * band.target.rig.views * band.rows
+        groups = -(-block_count // _LIST_GROUP)
+        across = min(groups, GROUPS_ACROSS)
+        self.work.write(self._no_work)
+        self._list.set(
+            {
+                "FrameBlock": band.frame(batch),
+                **listed,
+                "TriangleTracks": shown or self._blocks,
+            },
+            {
+                "block_count": block_count,
+                "row_blocks": self._row_blocks,
+                "groups_across": across,
+            },
+        )
+        self._list.run((across, -(-groups // across), 1))
+        return listed
+
+    def release(self) -> None:
+        """Free the kernel and the list."""
+        for owner in (self._list, self._blocks, self.work):
+            owner.release()

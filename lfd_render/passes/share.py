@@ -1,0 +1,203 @@
+"""Shading that views share: what of a surface's light does not depend on the eye, once for all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lfd_render.gpu.device import Device
+from lfd_render.gpu.layout import dtype, lod_constants
+from lfd_render.gpu.memory import Buffer
+from lfd_render.gpu.programs import Kernel
+from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
+from lfd_render.passes.blocks import BLOCK, GROUP_BLOCKS, Blocks
+from lfd_render.passes.items import GROUPS_ACROSS
+from lfd_render.passes.placement import Placement, gl_matrix
+from lfd_render.passes.prefix_sum import PrefixSum
+from lfd_render.passes.sampling import DEFAULT_SAMPLING, Points, Sampling
+from lfd_render.passes.view_buffers import ViewBuffers
+from lfd_render.passes.view_target import Band, ViewTarget
+
+MOST_GROUPS = 16  # of views, by which a triangle's tracks divide them
+HEADROOM = 1.25
+_GROUP = 64  # local_size_x of the steps that take triangles, tracks or cells
+
+
+class SharedShade:
+    """ViewBuffers, ViewTarget → ViewTarget.images, by slice tracks: what a window row cuts from a
+    triangle, over a group of views that see it about equally dense.
+
+    What of a surface's light does not depend on the eye, textures and all, is shaded on the columns
+    of the group's middle view where some pixel of the group shows it. Each pixel mixes the two
+    columns about its place there, which its depth tells, and adds its own gloss.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        scene: SceneBuffers,
+        target: ViewTarget,
+        word_stride: int,
+        *,
+        lod: str = "area",
+        sampling: Sampling = DEFAULT_SAMPLING,
+    ) -> None:
+        """lod: one of LOD_RULES."""
+        constants = {
+            "BLOCK": BLOCK,
+            "GROUP_BLOCKS": GROUP_BLOCKS,
+            "WORD_STRIDE": word_stride,
+            "GROUPS_ACROSS": GROUPS_ACROSS,
+            "MOST_GROUPS": MOST_GROUPS,
+            **scene.constants(),
+            **scene.lighting.constants(),
+            **lod_constants(lod),
+            **sampling.constants(),
+        }
+        self._device, self._scene = device, scene
+        self._blocks = Blocks(device, target, word_stride, mark=True)
+        self._tracks = Kernel(device, "share/tracks.comp", constants)
+        self._mark = Kernel(device, "share/mark.comp", constants)
+        self._places = Kernel(device, "share/places.comp", constants)
+        self._matte = Kernel(device, "share/matte.comp", constants)
+        self._light = Kernel(device, "share/light.comp", constants)
+        self._sum = PrefixSum(device)
+        triangles = max((batch.triangles for batch in scene.batches), default=0)
+        self._words = Buffer(device, "slice tracks", 4 * triangles)
+        self._starts = Buffer(device, "slice tracks", 4 * triangles)
+        self._triangles = {
+            count: Buffer.of(device, "slice tracks", np.array([count], np.uint32))
+            for count in {batch.triangles for batch in scene.batches}
+        }
+        self._view_groups = Buffer.of(device, "slice tracks", view_groups(target.rig.views))
+        self._work = Buffer(device, "shared cells", dtype("SharedWork").itemsize)
+        self._work.fill(0)
+        self._make_room(target.band_pixels // 16, target.band_pixels // 8)
+
+    def _make_room(self, tracks: int, cells: int) -> None:
+        device = self._device
+        self._room = (tracks, cells)
+        self._shown = Buffer(device, "slice tracks", 8 * tracks)
+        self._track_records = Buffer(device, "slice tracks", dtype("Track").itemsize * tracks)
+        self._cells = Buffer(device, "shared cells", 16 * cells)
+
+    def opaque(
+        self,
+        batches: Sequence[tuple[Batch, Points]],
+        band: Band,
+        views: ViewBuffers,
+        placement: Placement,
+    ) -> None:
+        """Shade a band over the background, as `Shade.opaque` does; its words name nothing then.
+        batches: each with the points, on rows, that it was sampled by."""
+        band.target.images.clear((*placement.background, 0.0))
+        band.target.images.bind_image(0)
+        for batch, points in batches:
+            self._shade(batch, points, band, views, placement)
+
+    def _shade(
+        self,
+        batch: Batch,
+        points: Points,
+        band: Band,
+        views: ViewBuffers,
+        placement: Placement,
+    ) -> None:
+        frame = {"FrameBlock": band.frame(batch)}
+        eyes = {"Eyes": band.target.eyes, "RowOffsets": band.target.row_offsets}
+        geometry = {**frame, **batch.geometry(), "Draws": self._scene.draws}
+        of_triangles = {
+            "TriangleTracks": self._words,
+            "TrackStarts": self._starts,
+            "ViewGroups": self._view_groups,
+        }
+        cells = {"Tracks": self._track_records, "Cells": self._cells}
+        work = {"SharedWorkBlock": self._work}
+        lighting = self._scene.lighting
+        turn = {"turn_from_display": gl_matrix(placement.turn_from_display)}
+
+        self._words.fill(0)
+        listed = self._blocks(batch, band, views, self._words)
+        self._tracks.set({**geometry, **of_triangles, "Spans": points.sizes, "Eyes": eyes["Eyes"]})
+        self._tracks.run((-(-batch.triangles // _GROUP), 1, 1))
+        self._sum(self._starts, self._triangles[batch.triangles])
+
+        self._shown.fill(0)
+        self._mark.set({**frame, **listed, **of_triangles, "Shown": self._shown})
+        self._mark.run_indirect(self._blocks.work)
+
+        self._work.write(np.zeros(1, np.uint32))
+        shown = {"Shown": self._shown, "TrackTotal": self._sum.total}
+        groups = _groups(self._room[0])
+        self._places.set(
+            {**geometry, **shown, **eyes, **cells, **work}, {"groups_across": groups[0]}
+        )
+        self._places.run(groups)
+
+        groups = _groups(self._room[1])
+        self._matte.set(
+            {
+                **geometry,
+                **batch.attributes(),
+                "WorldNormals": batch.world_normals,
+                **self._scene.materials_of(),
+                **lighting.buffers(),
+                **eyes,
+                "PointSizes": points.sizes,
+                **work,
+                "Cells": self._cells,
+            },
+            {**turn, "groups_across": groups[0]},
+            {**self._scene.samplers(), **lighting.samplers()},
+        )
+        self._matte.run(groups)
+        self._light.set(
+            {**frame, **listed, **cells, **eyes, **lighting.buffers(), "Depths": views.depths},
+            turn,
+            lighting.samplers(),
+        )
+        self._light.run_indirect(self._blocks.work)
+
+    def fit(self) -> bool:
+        """Make room for the tracks and cells of frames since the last call; whether there was too
+        little. Waits for the device."""
+        tracks, cells = self._sum.take_most(), int(self._work.read(np.uint32)[1])
+        self._work.fill(0)
+        if tracks <= self._room[0] and cells <= self._room[1]:
+            return False
+        for owner in (self._shown, self._track_records, self._cells):
+            owner.release()
+        self._make_room(
+            max(self._room[0], int(tracks * HEADROOM)), max(self._room[1], int(cells * HEADROOM))
+        )
+        return True
+
+    def release(self) -> None:
+        """Free kernels and buffers."""
+        for owner in (
+            self._blocks, self._tracks, self._mark, self._places, self._matte, self._light, self._sum,
+            self._words, self._starts, *self._triangles.values(), self._view_groups, self._work,
+            self._shown, self._track_records, self._cells,
+        ):  # fmt: skip
+            owner.release()
+
+
+def _groups(count: int) -> tuple[int, int, int]:
+    """Work groups for so many threads."""
+    groups = -(-count // _GROUP)
+    across = min(groups, GROUPS_ACROSS)
+    return across, -(-groups // across), 1
+
+
+def view_groups(views: int) -> NDArray[np.uint32]:
+    """The group of each view, where views are divided into 1 to MOST_GROUPS: its number and its
+    middle view << 5, uint32 [groups - 1, view]."""
+    view = np.arange(views, dtype=np.uint32)
+    words = np.zeros((MOST_GROUPS, views), np.uint32)
+    for groups in range(1, MOST_GROUPS + 1):
+        group = view * groups // views
+        first, last = np.searchsorted(group, group), np.searchsorted(group, group, "right") - 1
+        words[groups - 1] = group | ((first + last) // 2).astype(np.uint32) << 5
+    return words
