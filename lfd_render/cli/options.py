@@ -78,6 +78,7 @@ class ShadePlace(StrEnum):
     """Where a pixel is shaded."""
 
     RAY = "ray"
+    SHARED = "shared"
     POINT = "point"
 
 
@@ -218,7 +219,10 @@ StochasticCullingOption = Annotated[
 ]
 ShadeOption = Annotated[
     ShadePlace | None,
-    typer.Option(help="Where pixels are shaded: at their ray's hit, or at the point they show."),
+    typer.Option(
+        help="Where pixels are shaded: at their ray's hit, with what views share done once, or at "
+        "the point they show; else as the preset has it."
+    ),
 ]
 CameraOption = Annotated[
     str | None,

@@ -192,13 +192,14 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("mat4", "diffuse_blue"),
         ("vec4", "turn"),  # cosine, sine of the turn about +y; intensity; the last level's number
     ),
-    # A slice track's shared shading: its first cell | steps between cells << CELL_BITS, the column
-    # of the first, and the eye of the view on whose columns they lie, in columns.
+    # A slice track's shared shading: its first cell, the column of that in the view on whose
+    # columns cells lie, steps between cells a column, and that view | number of steps <<
+    # STEPS_SHIFT.
     "Track": (
-        ("uint", "cells"),
+        ("uint", "first_cell"),
         ("float", "from"),
         ("float", "steps_per_column"),
-        ("float", "eye"),
+        ("uint", "view_steps"),
     ),
     # Cells of all tracks, and the most since the host last looked.
     "SharedWork": (
@@ -222,8 +223,8 @@ CONSTANTS: dict[str, int] = {
     "DOUBLE_SIDED": 1 << 16,
     "MOST_CELLS": 2048,  # of a triangle's lattice along a side, as the point-sampling view is large
     "TRACK_WORD": 1 << 31,  # bit: the word of a view pixel names a slice track
-    "CELL_BITS": 22,  # of a track's first cell; the rest of the word counts steps
-    "MOST_STEPS": (1 << 10) - 1,
+    "STEPS_SHIFT": 10,
+    "MOST_STEPS": 4096,  # between cells of a track, more than a window's columns
     "UNLIT": 1,  # flag of a material
     "STUDIO": 1,  # kinds of environment
     "PICTURE": 2,

@@ -10,7 +10,7 @@ from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch
 from lfd_render.passes.items import GROUPS_ACROSS
-from lfd_render.passes.view_buffers import ViewBuffers
+from lfd_render.passes.view_buffers import Winners
 from lfd_render.passes.view_target import Band, ViewTarget
 
 BLOCK = 16  # columns of a view that go together
@@ -19,7 +19,7 @@ _LIST_GROUP = 64  # local_size_x of shade/blocks.comp
 
 
 class Blocks:
-    """ViewBuffers → the list of blocks that show a batch, and `work`, which dispatches over it."""
+    """Winners → the list of blocks that show a batch, and `work`, which dispatches over it."""
 
     def __init__(
         self, device: Device, target: ViewTarget, word_stride: int, *, mark: bool = False
@@ -41,13 +41,21 @@ class Blocks:
         self._no_work["groups_z"] = 1
 
     def __call__(
-        self, batch: Batch, band: Band, views: ViewBuffers, shown: Buffer | None = None
+        self,
+        batch: Batch,
+        band: Band,
+        views: Winners,
+        *,
+        rows: tuple[int, int] | None = None,
+        shown: Buffer | None = None,
     ) -> dict[str, Buffer]:
-        """List the blocks; what shaders read of them and the pixels' words, by block name. shown:
-        uint32 [triangle] that becomes 1 where a pixel shows it."""
+        """List the blocks; what shaders read of them and the pixels' words, by block name. rows: of
+        the band, [first, end), all by default. shown: uint32 [triangle] that becomes 1 where a
+        pixel shows it."""
+        first, end = rows or (0, band.rows)
+        row_blocks = self._row_blocks * band.target.rig.views
         listed = {"Words": views.words, "Blocks": self._blocks, "BlockWorkBlock": self.work}
-        block_count = self._row_blocks * band.target.rig.views * band.rows
-        groups = -(-block_count // _LIST_GROUP)
+        groups = -(-(row_blocks * (end - first)) // _LIST_GROUP)
         across = min(groups, GROUPS_ACROSS)
         self.work.write(self._no_work)
         self._list.set(
@@ -57,7 +65,8 @@ class Blocks:
                 "TriangleTracks": shown or self._blocks,
             },
             {
-                "block_count": block_count,
+                "first_block": row_blocks * first,
+                "block_count": row_blocks * (end - first),
                 "row_blocks": self._row_blocks,
                 "groups_across": across,
             },

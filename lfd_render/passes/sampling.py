@@ -29,8 +29,9 @@ class Sampling:
     (LFD-biased), or on both what the denser one needs. texture_limit: equations 1–3.
     culling: exact, or by vertices in frusta enlarged by a fifth (EPR section 3.1), which loses
     triangles. stochastic_culling: of triangles below a tenth of a pixel (EPR section 3.2), which
-    punches holes. shade: where a pixel's ray meets the surface, or at the point that owns it, one
-    colour a splat and view, as in the paper.
+    punches holes. shade: where a pixel's ray meets the surface; or shared, what does not depend on
+    the eye once for the views that see it alike; or at the point that owns the pixel, one colour a
+    splat and view, as in the paper.
     """
 
     lattice: str = "rows"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +23,15 @@ from lfd_render.passes.view_buffers import ViewBuffers
 from lfd_render.passes.view_target import Band, ViewTarget
 
 MOST_GROUPS = 16  # of views, by which a triangle's tracks divide them
+MOST_TRACKS = 5 << 20  # of a part of a band, 120 MiB with what they show
+MOST_CELLS = 7 << 20  # of a part: 112 MiB
+PIXELS_A_TRACK, PIXELS_A_CELL = 16, 8  # room at first, which suits scenes that fill the views
 HEADROOM = 1.25
 _GROUP = 64  # local_size_x of the steps that take triangles, tracks or cells
+
+
+class _Owner(Protocol):
+    def release(self) -> None: ...
 
 
 class SharedShade:
@@ -74,11 +83,14 @@ class SharedShade:
         self._view_groups = Buffer.of(device, "slice tracks", view_groups(target.rig.views))
         self._work = Buffer(device, "shared cells", dtype("SharedWork").itemsize)
         self._work.fill(0)
-        self._make_room(target.band_pixels // 16, target.band_pixels // 8)
+        self._parts = 1  # of a band, so that each fits
+        pixels = target.band_pixels
+        self._make_room(pixels // PIXELS_A_TRACK, pixels // PIXELS_A_CELL)
 
     def _make_room(self, tracks: int, cells: int) -> None:
         device = self._device
-        self._room = (tracks, cells)
+        self._room = (min(max(tracks, 1), MOST_TRACKS), min(max(cells, 1), MOST_CELLS))
+        tracks, cells = self._room
         self._shown = Buffer(device, "slice tracks", 8 * tracks)
         self._track_records = Buffer(device, "slice tracks", dtype("Track").itemsize * tracks)
         self._cells = Buffer(device, "shared cells", 16 * cells)
@@ -94,8 +106,11 @@ class SharedShade:
         batches: each with the points, on rows, that it was sampled by."""
         band.target.images.clear((*placement.background, 0.0))
         band.target.images.bind_image(0)
-        for batch, points in batches:
-            self._shade(batch, points, band, views, placement)
+        parts = min(self._parts, band.rows)
+        for part in range(parts):
+            rows = (part * band.rows // parts, (part + 1) * band.rows // parts)
+            for batch, points in batches:
+                self._shade(batch, points, band, views, placement, rows=rows)
 
     def _shade(
         self,
@@ -104,7 +119,10 @@ class SharedShade:
         band: Band,
         views: ViewBuffers,
         placement: Placement,
+        *,
+        rows: tuple[int, int],
     ) -> None:
+        """Shade what some rows of a band, [first, end), show of a batch."""
         frame = {"FrameBlock": band.frame(batch)}
         eyes = {"Eyes": band.target.eyes, "RowOffsets": band.target.row_offsets}
         geometry = {**frame, **batch.geometry(), "Draws": self._scene.draws}
@@ -119,8 +137,11 @@ class SharedShade:
         turn = {"turn_from_display": gl_matrix(placement.turn_from_display)}
 
         self._words.fill(0)
-        listed = self._blocks(batch, band, views, self._words)
-        self._tracks.set({**geometry, **of_triangles, "Spans": points.sizes, "Eyes": eyes["Eyes"]})
+        listed = self._blocks(batch, band, views, rows=rows, shown=self._words)
+        self._tracks.set(
+            {**geometry, **of_triangles, "Spans": points.sizes, "Eyes": eyes["Eyes"]},
+            {"first_row": band.first + rows[0], "end_row": band.first + rows[1]},
+        )
         self._tracks.run((-(-batch.triangles // _GROUP), 1, 1))
         self._sum(self._starts, self._triangles[batch.triangles])
 
@@ -169,18 +190,21 @@ class SharedShade:
             return False
         for owner in (self._shown, self._track_records, self._cells):
             owner.release()
-        self._make_room(
-            max(self._room[0], int(tracks * HEADROOM)), max(self._room[1], int(cells * HEADROOM))
-        )
+        wanted = (int(tracks * HEADROOM), int(cells * HEADROOM))
+        parts = max(wanted[0] / MOST_TRACKS, wanted[1] / MOST_CELLS)
+        self._parts = math.ceil(self._parts * max(1.0, parts))
+        self._make_room(max(self._room[0], wanted[0]), max(self._room[1], wanted[1]))
         return True
 
     def release(self) -> None:
         """Free kernels and buffers."""
-        for owner in (
-            self._blocks, self._tracks, self._mark, self._places, self._matte, self._light, self._sum,
+        owners: tuple[_Owner, ...] = (
+            self._blocks, self._sum,
+            self._tracks, self._mark, self._places, self._matte, self._light,
             self._words, self._starts, *self._triangles.values(), self._view_groups, self._work,
             self._shown, self._track_records, self._cells,
-        ):  # fmt: skip
+        )  # fmt: skip
+        for owner in owners:
             owner.release()
 
 

@@ -193,6 +193,9 @@ class RenderOptions:
             preset = replace(preset, source="compute")  # the only one that rows have
         elif self.point_source == "raster" and self.lattice is None:
             preset = replace(preset, lattice="paper")
+        lattice = self.lattice or preset.lattice
+        if self.preset == "default" and lattice == "rows":
+            preset = replace(preset, shade="shared")
         chosen: dict[str, Any] = {
             "lattice": self.lattice,
             "source": self.point_source,
@@ -209,6 +212,10 @@ class RenderOptions:
         if sampling.source == "raster" and sampling.lattice == "rows":
             raise UsageError(
                 "point source 'raster': rows are cut in compute; use it with lattice 'paper'"
+            )
+        if sampling.shade == "shared" and sampling.lattice == "paper":
+            raise UsageError(
+                "shade 'shared': what rows cut from triangles is shaded; use it with lattice 'rows'"
             )
         if self.projection == "general" and sampling.lattice == "paper":
             raise UsageError(

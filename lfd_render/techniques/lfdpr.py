@@ -81,7 +81,7 @@ class Lfdpr:
         stride = self._views.word_stride
         self._shade = Shade(device, scene, target, stride, lod=lod, sampling=sampling)
         self._shared: SharedShade | None = None
-        if sampling.shade == "shared":
+        if sampling.shade == "shared" and target.rig.views > 1:
             self._shared = SharedShade(device, scene, target, stride, lod=lod, sampling=sampling)
         self._points: list[Points] = [self._source.allocate(batch) for batch in scene.batches]
         self._make_counter = partial(
@@ -144,10 +144,9 @@ class Lfdpr:
 
     def complete(self) -> bool:
         """Whether there was room for all points since the last call; if not, there is now."""
-        enlarged = [self._source.fit(points) for points in self._points] + [
-            self._splat.fit(),
-            self._shade.fit(),
-        ]
+        enlarged = [self._source.fit(points) for points in self._points] + [self._splat.fit()]
+        if self._shared:
+            enlarged.append(self._shared.fit())
         return not any(enlarged)
 
     def count_points(self) -> int:

@@ -1,6 +1,7 @@
 // The blocks of BLOCK columns that show triangles of a batch: a software device runs all that a branch
 // skips, and backgrounds are large. The order of the list varies; what it leads to does not.
-// In: Words. Out: Blocks (row of the band << 22 | view << 12 | block of the row), BlockWork, and which triangles are shown.
+// In: Words. Out: Blocks (row of the band << 22 | view << 12 | block of the row), BlockWork, and which triangles are
+// shown.
 
 layout(local_size_x = 64) in;
 
@@ -12,13 +13,15 @@ layout(std430) writeonly restrict buffer Blocks { uint blocks[]; };
 layout(std430) restrict buffer BlockWorkBlock { BlockWork block_work; };
 layout(std430) writeonly restrict buffer TriangleTracks { uint triangle_tracks[]; };  // where MARK_TRIANGLES is 1
 
-uniform uint block_count;   // of the band
+uniform uint first_block;   // of all of the band, and how many
+uniform uint block_count;
 uniform uint row_blocks;    // of one row of one view
 uniform uint groups_across; // work groups of the dispatch along x
 
 void main() {
     uint block = gl_GlobalInvocationID.y * groups_across * 64u + gl_GlobalInvocationID.x;
     if (block >= block_count) return;
+    block += first_block;
     uint line = block / row_blocks, first = (block % row_blocks) * BLOCK;
     uint end = min(first + BLOCK, uint(frame.columns));
     bool any_here = false;

@@ -32,10 +32,10 @@ void main() {
     float k = frame.distance_mm / depths[index + WORD_STRIDE - 1u];
     Track track = tracks[word & ~TRACK_WORD];
     float eye = eyes[pixel.z], column = float(pixel.x) + 0.5;
-    float at = column + (track.eye - eye) * (1.0 - k);  // the shear identity
-    uint steps = track.cells >> CELL_BITS;
+    float at = column + (eyes[track.view_steps & (1u << STEPS_SHIFT) - 1u] - eye) * (1.0 - k);  // the shear identity
+    uint steps = track.view_steps >> STEPS_SHIFT;
     float along = clamp((at - track.from) * track.steps_per_column, 0.0, float(steps)), before = floor(along);
-    uint place = (track.cells & (1u << CELL_BITS) - 1u) + uint(before);
+    uint place = track.first_cell + uint(before);
     Matte matte = mixed(matte_from(cells[place]), matte_from(cells[along < float(steps) ? place + 1u : place]), along - before);
 
     int row = frame.band_first + pixel.y;

@@ -29,11 +29,11 @@ void main() {
     uint track = (gl_WorkGroupID.y * groups_across + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
     uvec2 what = track < min(track_total[0], shown.length()) ? shown[track] : uvec2(0u);
     uint steps = 0u, count = 0u;
-    float from = 0.0, to = 0.0, eye = 0.0;
+    float from = 0.0, to = 0.0;
     if (what.x != 0u) {
         uvec4 corners = triangles[what.x - 1u];
         int row = int(what.y & 0xFFFFu);
-        eye = eyes[what.y >> 16];
+        float eye = eyes[what.y >> 16];
         Slice slice = slice_triangle(display_positions[corners.x].xyz, display_positions[corners.y].xyz,
                                      display_positions[corners.z].xyz, row, row_offsets[row]);
         // Where rounding sees none, a pixel of the middle of the triangle tells of all.
@@ -56,7 +56,7 @@ void main() {
     place += group_first;
     bool one = steps == 0u;
     float step = one ? 0.0 : (to - from) / float(steps);
-    tracks[track] = Track(place | steps << CELL_BITS, one ? 0.5 * (from + to) : from, one ? 0.0 : 1.0 / step, eye);
+    tracks[track] = Track(place, one ? 0.5 * (from + to) : from, one ? 0.0 : 1.0 / step, what.y >> 16 | steps << STEPS_SHIFT);
     for (uint i = 0u; i < count; i++) {
         if (place + i >= cells.length()) return;
         float column = one ? 0.5 * (from + to) : i == steps ? to : from + float(i) * step;

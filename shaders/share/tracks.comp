@@ -12,6 +12,9 @@ layout(local_size_x = 64) in;
 layout(std430) readonly restrict buffer Spans { Span spans[]; };
 layout(std430) readonly restrict buffer Eyes { float eyes[]; };
 
+uniform int first_row;  // of the part of the band, and where it ends
+uniform int end_row;
+
 const float LEAST_DENSITY = 0.5;  // of a group's sparsest view over its densest
 const float MOST_LEAN = 0.5;      // of a view's footprint over the middle view's, columns a row
 
@@ -40,7 +43,9 @@ void main() {
     float first = eye_side(plane, frame.eye_first * frame.column_mm);
     float last = eye_side(plane, frame.eye_last * frame.column_mm);
     bool turns = (first < 0.0) != (last < 0.0), both = (draws[triangle.w].facing & FACING_BOTH) != 0u;
-    uint rows = spans[index].rows, word = rows & 0xFFFFu, groups = 2u;
+    uint rows = spans[index].rows, groups = 2u;
+    int from = max(int(rows & 0xFFFFu), first_row), to = min(int((rows & 0xFFFFu) + (rows >> 16)), end_row);
+    uint word = uint(from);
     if (turns && both) {
         word |= BOTH_SIDES | crossing_view(plane) << 22;
     } else {
@@ -51,5 +56,5 @@ void main() {
         groups = uint(clamp(ceil(max(by_density, lean / MOST_LEAN)), 1.0, min(float(MOST_GROUPS), float(frame.views))));
     }
     triangle_tracks[index] = word | groups << 16;
-    track_starts[index] = (rows >> 16) * groups;
+    track_starts[index] = uint(max(to - from, 0)) * groups;
 }

@@ -1,0 +1,142 @@
+"""Shading that views share: the picture of rays but for what lies between two places of a slice."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from lfd_render import DisplayProfile, Renderer, Scene
+from lfd_render.gpu.device import Device
+from lfd_render.passes import share
+from lfd_render.passes.share import MOST_GROUPS, view_groups
+from lfd_render.scene import Light, Material
+
+from .helpers import PAPER, few_lenses, mesh_of, millimetre_camera, scene_of, soup
+from .test_same_bits import balls
+
+pytestmark = pytest.mark.needs("gl")
+
+VIEWS = 24
+SIZE = (160, 120)
+
+
+@pytest.mark.parametrize("views", [2, 7, 48, 1024])
+def test_groups_divide_views_in_order_about_their_middle(views: int) -> None:
+    for groups, words in enumerate(view_groups(views), start=1):
+        number, middle = words & 0x1F, words >> 5
+        used = np.unique(number)
+        assert (np.diff(number.astype(int)) >= 0).all()
+        if groups <= views:
+            assert len(used) == groups
+            sizes = np.bincount(number)
+            assert sizes.max() - sizes.min() <= 1
+        for group in used:
+            members = np.flatnonzero(number == group)
+            assert set(middle[members]) == {(members[0] + members[-1]) // 2}
+    assert len(view_groups(views)) == MOST_GROUPS
+
+
+@pytest.fixture(scope="module")
+def renderer(device: Device) -> Renderer:
+    return Renderer(device)
+
+
+def views_of(renderer: Renderer, scene: Scene, shade: str, views: int = VIEWS) -> NDArray[np.int64]:
+    display = DisplayProfile.load(PAPER)
+    found = renderer.views(scene, display, views=views, view_size=SIZE, shade=shade)
+    assert found.std() > 10
+    return found.astype(int)
+
+
+def test_every_triangle_keeps_its_own_colour(renderer: Renderer, rng: np.random.Generator) -> None:
+    """Unlit triangles from far below a column to most of the window, in all attitudes, half of
+    them double-sided: halves round a colour by less than a level, and nothing else changes it.
+    """
+    display = DisplayProfile.load(PAPER)
+    corners = soup(rng, 3000, display)
+    materials = tuple(
+        Material(str(i), (*rng.uniform(0.05, 1, 3), 1.0), unlit=True, double_sided=bool(i % 2))
+        for i in range(50)
+    )
+    meshes = [mesh_of(corners[i::50], i) for i in range(50)]
+    scene = scene_of(*meshes, materials=materials)
+    camera = millimetre_camera(display.size_mm)
+    ray, shared = (
+        renderer.views(scene, display, camera, views=VIEWS, view_size=SIZE, shade=shade).astype(int)
+        for shade in ("ray", "shared")
+    )
+    assert np.abs(ray - shared).max() <= 1
+    assert np.abs(ray - np.roll(shared, 1, axis=2)).max() > 100  # control: a column off
+
+
+@pytest.mark.parametrize(
+    ("name", "rms", "beyond"),
+    [
+        ("gallery", 1.5, 0.01),
+        ("spheres", 0.5, 0.003),
+        ("balls", 0.5, 0.003),
+        ("lights", 0.7, 0.006),
+    ],
+)
+def test_lit_textured_scenes_differ_little(
+    renderer: Renderer, name: str, rms: float, beyond: float
+) -> None:
+    """What differs is what changes within half a column of a slice: texture edges, glints."""
+    scene = {
+        "gallery": lambda: Scene.load("builtin:gallery?triangles=20000"),
+        "spheres": lambda: Scene.load("builtin:spheres?triangles=20000"),
+        "balls": balls,
+        "lights": lit_spheres,
+    }[name]()
+    ray, shared = (views_of(renderer, scene, shade) for shade in ("ray", "shared"))
+    assert ((ray == 0).all(-1) == (shared == 0).all(-1)).all()  # the same pixels show something
+    apart = np.abs(ray - shared)
+    assert np.sqrt((apart**2).mean()) < rms
+    assert (apart > 8).mean() < beyond
+    # Control: the neighbouring view is another picture.
+    other = np.abs(ray[1:] - shared[:-1])
+    assert np.sqrt((other**2).mean()) > 2 * rms
+
+
+@pytest.mark.parametrize("part", ["room", "cells", "tracks"])
+def test_little_room_changes_no_bit(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, part: str
+) -> None:
+    scene = balls()
+    whole = views_of(renderer, scene, "shared", views=7)
+    if part == "room":
+        monkeypatch.setattr(share, "PIXELS_A_TRACK", 10**9)
+        monkeypatch.setattr(share, "PIXELS_A_CELL", 10**9)
+    else:
+        monkeypatch.setattr(share, f"MOST_{part.upper()}", 5000)
+    np.testing.assert_array_equal(views_of(renderer, scene, "shared", views=7), whole)
+
+
+def test_one_view_has_nobody_to_share_with(renderer: Renderer) -> None:
+    scene = Scene.load("builtin:spheres?triangles=2000")
+    ray, shared = (views_of(renderer, scene, s, views=1) for s in ("ray", "shared"))
+    np.testing.assert_array_equal(ray, shared)
+
+
+def test_panel_images_are_those_of_rays_too(renderer: Renderer) -> None:
+    display = few_lenses(PAPER, 53.3, (320, 180))
+    scene = Scene.load("builtin:gallery?triangles=20000")
+    ray, shared = (
+        renderer.render(scene, display, views=VIEWS, shade=shade).pixels.astype(int)
+        for shade in ("ray", "shared")
+    )
+    assert np.sqrt(((ray - shared) ** 2).mean()) < 4.0
+    assert np.sqrt(((ray - np.roll(shared, 8, axis=1)) ** 2).mean()) > 10.0  # control: a lens off
+
+
+def lit_spheres() -> Scene:
+    """Spheres under a directional light and a lamp among them."""
+    scene = Scene.load("builtin:spheres?triangles=20000")
+    low, high = scene.bounds()
+    extent = float(np.linalg.norm(high - low))
+    place = np.eye(4)
+    place[:3, 3] = 0.5 * (low + high) + (0.0, 0.3 * extent, 0.4 * extent)
+    sun = Light("sun", "directional", np.eye(4), (1.0, 0.9, 0.8), 2.0)
+    lamp = Light("lamp", "point", place, (0.6, 0.8, 1.0), 0.3 * extent**2)
+    return dataclasses.replace(scene, lights=(sun, lamp))
