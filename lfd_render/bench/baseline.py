@@ -87,7 +87,12 @@ def measure(
     rig, size = display.rig(study.views), study.view_size
     chosen = chosen_views(rig.views, study.compared)
     ours = renderer.views(
-        scene, display, camera, rig=rig, view_size=size, **{"lod": study.lod, **options}
+        scene,
+        display,
+        camera,
+        rig=rig,
+        view_size=size,
+        **{"lod": study.lod, "shade": "ray", **options},
     )[chosen]
     theirs, standard = [], []
     for view in chosen:

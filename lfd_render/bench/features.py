@@ -34,6 +34,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "no texture limit": {"texture_limit": False},
     "stochastic culling": {"stochastic_culling": True},
     "culling by vertices": {"culling": "vertices"},
+    "shade by rays": {"shade": "ray"},
     "shade at points": {"shade": "point"},
     "lattice paper": {"lattice": "paper"},
     "lattice paper, isotropic": {"lattice": "paper", "density": "isotropic"},

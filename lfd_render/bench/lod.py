@@ -161,9 +161,9 @@ def measure(
         for view in chosen
     ]  # fmt: skip
     found = {
-        rule: renderer.views(scene, display, camera, rig=rig, view_size=study.view_size, lod=rule)[
-            chosen
-        ]
+        rule: renderer.views(
+            scene, display, camera, rig=rig, view_size=study.view_size, lod=rule, shade="ray"
+        )[chosen]
         for rule in LOD_RULES
     }
     if pictures is not None:

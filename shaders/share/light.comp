@@ -35,8 +35,9 @@ void main() {
     float at = column + (eyes[track.view_steps & (1u << STEPS_SHIFT) - 1u] - eye) * (1.0 - k);  // the shear identity
     uint steps = track.view_steps >> STEPS_SHIFT;
     float along = clamp((at - track.from) * track.steps_per_column, 0.0, float(steps)), before = floor(along);
-    uint place = track.first_cell + uint(before);
-    Matte matte = mixed(matte_from(cells[place]), matte_from(cells[along < float(steps) ? place + 1u : place]), along - before);
+    uint first = track.first_cell, cell = min(uint(before), max(steps, 1u) - 1u), next = min(cell + 1u, steps);
+    Matte matte = interpolated(matte_from(cells[first + max(cell, 1u) - 1u]), matte_from(cells[first + cell]), matte_from(cells[first + next]),
+                               matte_from(cells[first + min(cell + 2u, steps)]), along - float(cell));
 
     int row = frame.band_first + pixel.y;
     vec2 window = vec2((column - row_offsets[row]) * frame.column_mm, row_centre_mm(row));

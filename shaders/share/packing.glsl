@@ -24,9 +24,26 @@ Matte matte_from(uvec4 words) {
                  float(words.w >> 24) * (1.0 / 255.0), (words.z & 1u << 30) != 0u, 1.0);
 }
 
-// Normals are of any length, as `matte_from` has them, and of unit length when mixed.
-Matte mixed(Matte a, Matte b, float t) {
-    vec3 normal = mix(a.normal, b.normal, t);
-    return Matte(mix(a.radiance, b.radiance, t), normal * inversesqrt(max(dot(normal, normal), 1e-20)), mix(a.f0, b.f0, t),
-                 mix(a.roughness, b.roughness, t), mix(a.occlusion, b.occlusion, t), a.glossy, 1.0);
+// Adds a part of one to another.
+void add(inout Matte sum, Matte matte, float weight) {
+    sum.radiance += weight * matte.radiance;
+    sum.normal += weight * matte.normal;
+    sum.f0 += weight * matte.f0;
+    sum.roughness += weight * matte.roughness;
+    sum.occlusion += weight * matte.occlusion;
+}
+
+// What lies t of the way from b to c, of four in a row: Catmull and Rom's cubic, which keeps detail that a straight line
+// between two would blur.
+Matte interpolated(Matte a, Matte b, Matte c, Matte d, float t) {
+    Matte sum = Matte(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0, b.glossy, 1.0);
+    add(sum, a, t * (-0.5 + t * (1.0 - 0.5 * t)));
+    add(sum, b, 1.0 + t * t * (-2.5 + 1.5 * t));
+    add(sum, c, t * (0.5 + t * (2.0 - 1.5 * t)));
+    add(sum, d, t * t * (-0.5 + 0.5 * t));
+    sum.radiance = max(sum.radiance, 0.0);
+    sum.normal *= inversesqrt(max(dot(sum.normal, sum.normal), 1e-20));
+    sum.f0 = max(sum.f0, 0.0);
+    sum.roughness = clamp(sum.roughness, 0.0, 1.0);
+    return sum;
 }
