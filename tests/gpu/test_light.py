@@ -321,7 +321,7 @@ def test_highlights_move_between_views(device: Device, technique: str) -> None:
         shifts.append(np.diff([brightest_column(picture) for picture in pictures]))
     mirrored, painted = shifts
     assert np.all(mirrored > 1.0)
-    assert np.all(np.abs(painted) < 0.5)
+    assert np.all(np.abs(painted) < 0.75)  # what views share is found every half column
 
 
 @pytest.mark.parametrize("environment", ["studio", "none", "picture"])

@@ -44,7 +44,9 @@ def test_panel_images_are_alike(
     grid = ViewGrid.upright(display, *size) if size else None
     options = {"background": (0.1, 0.2, 0.3), "exposure": 0.8, "lod": lod}
     with Renderer(device) as renderer:
-        found = renderer.render(scene, display, camera, view_size=size, **options).pixels
+        found = renderer.render(
+            scene, display, camera, view_size=size, shade="ray", **options
+        ).pixels
     expected = render_eia(scene, display, camera, grid=grid, **options)
     assert found.shape == (144, 256, 3)
     far_off, _ = likeness(found, expected)

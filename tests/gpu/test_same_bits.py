@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from lfd_render import DisplayProfile, Renderer, Scene
 from lfd_render.gpu import scene_buffers
 from lfd_render.gpu.device import Device
-from lfd_render.passes import cells, owned, sample, view_target
+from lfd_render.passes import cells, owned, sample, share, view_target
 from lfd_render.scene import Mesh
 
 from .helpers import FULL, PAPER, few_lenses
@@ -28,13 +28,14 @@ pytestmark = pytest.mark.needs("gl")
 VARIANTS: dict[str, dict[str, object]] = {
     "default": {},
     "two-pass": {"splat": "two-pass"},
+    "by rays": {"shade": "ray"},
     "general": {"projection": "general"},
     "paper's lattice": {"lattice": "paper"},
     "at points": {"shade": "point"},
     "paper": {"preset": "paper", "seed": 7},
 }
-# Of these the pictures are those of the default, too.
-SAME_AS_DEFAULT = ("two-pass", "paper's lattice")
+# Of these the pictures are those of others, too.
+SAME_AS = {"two-pass": "default", "paper's lattice": "by rays"}
 # One limit lowered at a time, and all, until the work falls into parts.
 PARTS: dict[str, list[tuple[object, str, int]]] = {
     "bands": [(view_target, "BAND_BYTES", 4 * 7 * 5 * 54)],
@@ -43,11 +44,14 @@ PARTS: dict[str, list[tuple[object, str, int]]] = {
     "batches of few vertices": [(scene_buffers, "BATCH_VERTICES", 500)],
     "dispatches": [(owned, "MOST_ITERATIONS", 60)],
     "lists of cells": [(cells, "MOST_WINDOW_POINTS", 4001)],
+    "slice tracks": [(share, "MOST_TRACKS", 3001)],
+    "shared cells": [(share, "MOST_CELLS", 5003)],
     "all": [
         (view_target, "BAND_BYTES", 4 * 7 * 11 * 54),
         (sample, "MOST_WINDOW_ITEMS", 257),
         (scene_buffers, "BATCH_TRIANGLES", 1301),
         (cells, "MOST_WINDOW_POINTS", 5003),
+        (share, "MOST_CELLS", 7001),
     ],
 }
 
@@ -88,8 +92,9 @@ def digest(bits: NDArray[np.uint16]) -> str:
 def test_pictures_do_not_depend_on_the_division_of_work(device: Device, variant: str) -> None:
     options = VARIANTS[variant]
     whole = picture(device, balls(), **options)
-    if variant in SAME_AS_DEFAULT:
-        np.testing.assert_array_equal(whole, picture(device, balls()))
+    if variant in SAME_AS:
+        other = VARIANTS[SAME_AS[variant]]
+        np.testing.assert_array_equal(whole, picture(device, balls(), **other))
     for limits in PARTS.values() if FULL or variant == "default" else [PARTS["all"]]:
         with pytest.MonkeyPatch.context() as patch:
             for owner, name, limit in limits:
