@@ -43,7 +43,6 @@ def test_ideas_that_change_no_pixel_change_none(
     assert results["no texture limit"].points > 1.2 * base.points
     assert results["lattice paper"].pairs_per_pixel > base.pairs_per_pixel
     assert results["lod none"].rmse > base.rmse
-    assert results["shade at points"].rmse > base.rmse
     assert results["mvr"].points is None
     lines = table(list(results.values())).splitlines()
     assert len(lines) == 2 + len(TRIED)

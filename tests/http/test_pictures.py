@@ -88,6 +88,8 @@ def test_views_one_by_one_and_together(
     assert archive.namelist() == [f"view_{n:03d}.png" for n in range(8)]
     for index, name in enumerate(archive.namelist()):
         assert np.array_equal(np.array(Image.open(archive.open(name))), expected[index])
+    # Alone it shares nothing with others, as all do by rays.
+    expected = Renderer(device).views(scene, display, view_size=(24, 16), shade="ray")
     one = client.get(f"{PATH}/view", params=query | {"index": 5})
     assert np.array_equal(pixels(one), expected[5])
     quilt = pixels(client.get(f"{PATH}/quilt?display={small}&tiles=4x2&size=96x32"))

@@ -11,7 +11,8 @@ from lfd_render.renderer.options import choose
 
 
 def test_presets_choose_the_sampling() -> None:
-    assert RenderOptions().sampling == DEFAULT_SAMPLING
+    assert RenderOptions().sampling == dataclasses.replace(DEFAULT_SAMPLING, shade="shared")
+    assert RenderOptions(preset="gold").sampling == DEFAULT_SAMPLING
     assert RenderOptions(preset="paper").sampling == PAPER_SAMPLING
 
 
@@ -34,6 +35,7 @@ def test_what_is_not_chosen_follows_from_what_is(
 ) -> None:
     sampling = RenderOptions(**options).sampling
     assert (sampling.lattice, sampling.source) == (lattice, source)
+    assert sampling.shade != "shared"  # which is the default preset's, on rows
 
 
 @pytest.mark.parametrize(
@@ -43,7 +45,8 @@ def test_what_is_not_chosen_follows_from_what_is(
         ({"point_source": "rays"}, "point source 'rays': unknown; use compute or raster"),
         ({"density": "high"}, "density 'high': unknown; use lfd or isotropic"),
         ({"culling": "all"}, "culling 'all': unknown; use exact or vertices"),
-        ({"shade": "pixel"}, "shade 'pixel': unknown; use ray or point"),
+        ({"shade": "pixel"}, "shade 'pixel': unknown; use ray or shared or point"),
+        ({"lattice": "paper", "shade": "shared"}, "shade 'shared': what rows cut"),
         ({"lattice": "rows", "point_source": "raster"}, "rows are cut in compute"),
         ({"lattice": "paper", "projection": "general"}, "use it with lattice 'rows'"),
         ({"lattice": "paper", "splat": "owned"}, "use auto, two-pass or int64"),
