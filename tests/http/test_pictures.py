@@ -89,9 +89,9 @@ def test_views_one_by_one_and_together(
     for index, name in enumerate(archive.namelist()):
         assert np.array_equal(np.array(Image.open(archive.open(name))), expected[index])
     # Alone it shares nothing with others, as all do by rays.
-    expected = Renderer(device).views(scene, display, view_size=(24, 16), shade="ray")
+    alone = Renderer(device).views(scene, display, view_size=(24, 16), shade="ray")
     one = client.get(f"{PATH}/view", params=query | {"index": 5})
-    assert np.array_equal(pixels(one), expected[5])
+    assert np.array_equal(pixels(one), alone[5])
     quilt = pixels(client.get(f"{PATH}/quilt?display={small}&tiles=4x2&size=96x32"))
     assert np.array_equal(quilt[16:, 24:48], expected[1])  # view 0 bottom-left
 
