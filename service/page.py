@@ -53,7 +53,7 @@ def _file(request: Request, name: str) -> Response:
 @router.api_route("/panel", methods=["GET", "HEAD"])
 async def page(request: Request) -> Response:
     """The page, its calibration, or the window that shows a panel's pixels."""
-    return _file(request, PAGES[request.scope["path"].removeprefix(request.scope["root_path"])])
+    return _file(request, PAGES[request.scope["route"].path])
 
 
 @router.api_route("/page/{name}", methods=["GET", "HEAD"])

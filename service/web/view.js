@@ -6,6 +6,7 @@ import { decode } from "./exact.js";
 import { EyePlan } from "./eye-plan.js";
 import { attempt, complain, forgive, note } from "./notices.js";
 import { Outlet } from "./outlet.js";
+import { Picture } from "./picture.js";
 import { Scenes } from "./scenes.js";
 import { showTimings } from "./timings.js";
 
@@ -16,21 +17,17 @@ const SETTLE_MS = 350; // of rest before the panel image is made
 const ROUGH_FROM_MS = 300; // panel images that take longer wait until the hand rests
 const SWEEP_EYES = 9;
 const SWEEP_OF_CONE = 0.9;
-const GAP_PX = 8; // between the pictures of a row, as panel/picture.py has it
-const FRAME_MS = 90;
 const ROUGH_PIXELS = 480;
 
 const $ = (selector) => document.querySelector(selector);
 const stage = $("#stage");
-const picture = $("#picture");
+const picture = new Picture($("#picture"), $("#play"));
 const options = $("#options");
 const chosen = (name) => $(`[name=${name}]:checked`).value;
 
 const place = { yaw: 0, pitch: 0, eye: null };
 let frameMs = 0; // what the last panel image took
-let strip = null; // the sweep's pictures
 let last = null; // what the picture on the stage was asked for by
-let playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 // --- what is asked for ---------------------------------------------------------------------------
 
@@ -115,8 +112,8 @@ function refresh(rough = false) {
 async function showRough(signal) {
   const response = await render(roughBody(), "image/jpeg", signal);
   const image = await decode(await response.blob());
-  last = strip = null;
-  draw(image);
+  last = null;
+  picture.show(image);
   said("Draft: a single view. Rest, and the panel image follows.");
 }
 
@@ -134,10 +131,9 @@ async function showPanel(signal) {
   const spans = timings(response);
   frameMs = spans.frame ?? frameMs;
   showTimings($("#timings"), spans, performance.now() - started);
-  strip = mode === "sweep" ? image : null;
-  if (mode === "sweep") play();
-  else if (mode === "stereo") drawPair(image, $("#pair").value);
-  else draw(image);
+  if (mode === "sweep") picture.showSweep(image, SWEEP_EYES);
+  else if (mode === "stereo") picture.showPair(image, $("#pair").value);
+  else picture.show(image);
   const warnings = response.headers.get("LFD-Warnings");
   if (warnings) note(warnings);
   said(where(mode));
@@ -152,70 +148,6 @@ function where(mode) {
   const outside = Math.abs(eyeDeg()) > displays.profile.viewing.cone_deg / 2;
   const who = mode === "stereo" ? "two eyes" : "an eye";
   return `Virtual panel, ${who} ${degrees}${outside ? ", outside the cone: views repeat" : ""}.`;
-}
-
-// --- drawing -------------------------------------------------------------------------------------
-
-function canvas(width, height) {
-  picture.width = width;
-  picture.height = height;
-  return picture.getContext("2d");
-}
-
-function draw(image) {
-  canvas(image.width, image.height).drawImage(image, 0, 0);
-}
-
-/** The two pictures of a pair: side by side, crossed, or one over the other in red and cyan. */
-function drawPair(image, way) {
-  const { height } = image;
-  const width = (image.width - GAP_PX) / 2;
-  const second = width + GAP_PX;
-  if (way !== "anaglyph") {
-    const context = canvas(2 * width, height);
-    const [left, right] = way === "crossed" ? [width, 0] : [0, width];
-    context.drawImage(image, 0, 0, width, height, left, 0, width, height);
-    context.drawImage(image, second, 0, width, height, right, 0, width, height);
-    return;
-  }
-  const context = canvas(width, height);
-  const half = (from, colour) => {
-    const part = new OffscreenCanvas(width, height);
-    const inside = part.getContext("2d");
-    inside.drawImage(image, from, 0, width, height, 0, 0, width, height);
-    inside.globalCompositeOperation = "multiply";
-    inside.fillStyle = colour;
-    inside.fillRect(0, 0, width, height);
-    return part;
-  };
-  context.drawImage(half(0, "#f00"), 0, 0);
-  context.globalCompositeOperation = "lighter";
-  context.drawImage(half(second, "#0ff"), 0, 0);
-}
-
-let shown = 0;
-
-function drawSweep(index) {
-  const { height } = strip;
-  const pitch = (strip.width + GAP_PX) / SWEEP_EYES;
-  const width = pitch - GAP_PX;
-  canvas(width, height).drawImage(strip, index * pitch, 0, width, height, 0, 0, width, height);
-}
-
-let ticking = null;
-
-/** Show the sweep's pictures to and fro, or the one it rests at. */
-function play() {
-  $("#play").textContent = playing ? "Pause" : "Play";
-  clearInterval(ticking);
-  const there = 2 * (SWEEP_EYES - 1);
-  const tick = () => {
-    if (!strip) return clearInterval(ticking);
-    drawSweep(shown < SWEEP_EYES ? shown : there - shown);
-    if (playing) shown = (shown + 1) % there;
-  };
-  tick();
-  if (playing) ticking = setInterval(tick, FRAME_MS);
 }
 
 function said(text) {
@@ -397,10 +329,6 @@ async function start() {
       refresh();
     });
   }
-  $("#play").addEventListener("click", () => {
-    playing = !playing;
-    play();
-  });
   $("#reset").addEventListener("click", reset);
   $("#enter").addEventListener("click", full);
   $("#window").addEventListener("click", () => outlet.open());
