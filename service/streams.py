@@ -43,7 +43,7 @@ class Moving(BaseModel):
     swing: Annotated[float, Field(ge=0, lt=90)] = Field(
         15.0, description="Degrees to either side, where it goes to and fro."
     )
-    fps: float = Field(12.0, gt=0, le=60, description="Frames a second at most.")
+    fps: float = Field(12.0, ge=0.01, le=60, description="Frames a second at most.")
     frames: int | None = Field(None, ge=1, le=1_000_000, description="End after so many.")
 
     def turned(self, frame: int) -> float:
