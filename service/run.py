@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
+import ctypes
 import logging
 import socket
+import struct
 from collections.abc import Callable
 
 import uvicorn
@@ -15,6 +18,9 @@ from .guards import is_loopback
 from .settings import Settings
 
 _KEEP_ALIVE_S = 30
+_HEARING_S = 0.5  # until those whose connection is made have been accepted and have begun to speak
+_SO_ATTACH_FILTER = 26  # linux/socket.h
+_BPF_RETURN = 6  # linux/bpf_common.h: BPF_RET | BPF_K
 
 
 def run(settings: Settings, say: Callable[[str], None]) -> None:
@@ -66,7 +72,7 @@ def _listening(settings: Settings) -> socket.socket:
 
 
 class _Server(uvicorn.Server):
-    """Says so when it is up."""
+    """Says so when it is up, and at its end takes all who have come."""
 
     def __init__(self, config: uvicorn.Config, up: Callable[[], None]) -> None:
         super().__init__(config)
@@ -77,3 +83,19 @@ class _Server(uvicorn.Server):
         await super().startup(sockets)
         if self.started:
             self._up()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End. Closing the door would reset the connections that wait before it, so first nobody
+        else comes in, and those who wait are heard."""
+        for listener in sockets or []:
+            _let_nobody_in(listener)
+        await asyncio.sleep(_HEARING_S)
+        await super().shutdown(sockets)
+
+
+def _let_nobody_in(listener: socket.socket) -> None:
+    """Drop the packets of connections that are being made, by a filter that passes none (Linux,
+    socket(7)); once the door is closed they are told so."""
+    instruction = ctypes.create_string_buffer(struct.pack("=HBBI", _BPF_RETURN, 0, 0, 0))
+    program = struct.pack("@HP", 1, ctypes.addressof(instruction))
+    listener.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, program)

@@ -29,6 +29,11 @@ Measured = Callable[[str, str], None]
 
 
 @pytest.fixture
+def takes_100_ms(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LFD_CHEAP_MS", "100")
+
+
+@pytest.fixture
 def takes_20_ms(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("LFD_CHEAP_MS", "20")
 
@@ -50,8 +55,8 @@ def place(client: httpx.Client) -> None:
 
 
 @pytest.mark.shows("4 x overload: only 200, or 429 with Retry-After; health stays quick")
-def test_overload(start: Start, takes_20_ms: None, scaled: Scaled, measured: Measured) -> None:
-    seconds, capacity = scaled(600, 4), 2 / 0.02
+def test_overload(start: Start, takes_100_ms: None, scaled: Scaled, measured: Measured) -> None:
+    seconds, capacity = scaled(600, 4), 2 / 0.1
     found: Counter[str] = Counter()
     health: list[float] = []
 
