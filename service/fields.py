@@ -95,6 +95,9 @@ class Placed(Fields):
     yaw: Degrees = Field(0.0, description="Turn the scene, its right side forward.")
     pitch: Degrees = Field(0.0, description="Then turn the scene, its upper side forward.")
     depth_scale: Positive = Field(1.0, description="Scale depth about the window.")
+    dolly: float = Field(
+        0.0, ge=-1000, le=1000, description="Move the window into the scene, in its heights."
+    )
     focus_distance: Positive | None = Field(
         None, description="With the name of a camera: from there to the window, in scene units."
     )

@@ -38,6 +38,7 @@ _OPTIONS: dict[str, tuple[Any, Any]] = {
     "yaw": (options.YawOption, 0.0),
     "pitch": (options.PitchOption, 0.0),
     "depth_scale": (options.DepthScaleOption, 1.0),
+    "dolly": (options.DollyOption, 0.0),
     "spacing": (options.SpacingOption, None),
     "environment": (options.EnvironmentOption, "studio"),
     "environment_turn": (options.EnvironmentTurnOption, 0.0),

@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from lfd_render import __version__
+from lfd_render.cli.animate import animate
 from lfd_render.cli.bench import bench
 from lfd_render.cli.compare import compare
 from lfd_render.cli.console import PROGRAM, say_error
@@ -40,7 +41,9 @@ from lfd_render.errors import (
 app = typer.Typer(
     pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]}
 )
-for command in (render, views, quilt, weave, unweave, look, compare, bench, serve, demo, doctor):
+for command in (
+    render, animate, views, quilt, weave, unweave, look, compare, bench, serve, demo, doctor,
+):  # fmt: skip
     app.command()(command)
 app.add_typer(display)
 

@@ -252,6 +252,10 @@ PitchOption = Annotated[
     ),
 ]
 DepthScaleOption = Annotated[float, typer.Option(metavar="F", help="Scale depth about the window.")]
+DollyOption = Annotated[
+    float,
+    typer.Option(metavar="HEIGHTS", help="Move the window into the scene, in its heights."),
+]
 SpacingOption = Annotated[
     Spacing | None,
     typer.Option(help="Rule by which the eyes are spaced; else the display's."),

@@ -177,6 +177,13 @@ class Camera:
         forward."""
         return replace(self, yaw_rad=self.yaw_rad + yaw_rad, pitch_rad=self.pitch_rad + pitch_rad)
 
+    def dollied(self, heights: float) -> Camera:
+        """This camera with its window moved so many of its heights into the scene, away from the
+        viewer; negative: toward the viewer."""
+        into = -np.linalg.inv(self.display_from_world((1.0, 1.0))[:3, :3])[:, 2]
+        target = np.array(self.target) + heights * self.window_height * _unit(into)
+        return replace(self, target=_vec3(target))
+
     def with_depth_scale(self, factor: float) -> Camera:
         """This camera with depth about the window multiplied by a factor."""
         return replace(self, depth_scale=self.depth_scale * factor)

@@ -19,8 +19,9 @@ class Choices:
     """Options of a picture, degrees and names as people give them; None: as the preset, the display
     or the scene has it.
 
-    camera: a camera of the scene by its name, or a window. exposure: a factor. The rest is as
-    RenderOptions and the command line's help say.
+    camera: a camera of the scene by its name, or a window. dolly: how far that moves into the
+    scene, in its heights. exposure: a factor. The rest is as RenderOptions and the command line's
+    help say.
     """
 
     views: int | Literal["continuous"] | None = None
@@ -49,6 +50,7 @@ class Choices:
     yaw: float = 0.0
     pitch: float = 0.0
     depth_scale: float = 1.0
+    dolly: float = 0.0
     environment: str | Environment = "studio"
     environment_turn: float = 0.0
     environment_intensity: float = 1.0
@@ -59,6 +61,8 @@ class Choices:
         for name in ("yaw", "pitch", "environment_turn"):
             if not math.isfinite(getattr(self, name)):
                 raise OptionError(name, f"{getattr(self, name)}; give a finite number of degrees")
+        if not math.isfinite(self.dolly):
+            raise OptionError("dolly", f"{self.dolly}; give a finite number of window heights")
         if not 0 < self.depth_scale < math.inf:
             raise OptionError("depth_scale", f"{self.depth_scale}; give a number above 0")
         if not 0 <= self.environment_intensity < math.inf:
@@ -86,7 +90,8 @@ class Choices:
         """
         chosen = self._window(scene, profile)
         turned = chosen.turned(math.radians(self.yaw), math.radians(self.pitch))
-        return turned.with_depth_scale(self.depth_scale)
+        turned = turned.with_depth_scale(self.depth_scale)
+        return turned.dollied(self.dolly) if self.dolly else turned
 
     def _window(self, scene: Scene, profile: DisplayProfile) -> Camera:
         from lfd_render.display import Camera  # noqa: PLC0415 (keeps --help quick)
@@ -104,7 +109,7 @@ class Choices:
         return Camera.from_view(named.world_from_camera, named.yfov_rad, distance)
 
 
-_OF_THE_WINDOW = {"camera", "focus_distance", "yaw", "pitch", "depth_scale"}
+_OF_THE_WINDOW = {"camera", "focus_distance", "yaw", "pitch", "depth_scale", "dolly"}
 _OPTIONS = [f.name for f in fields(Choices) if f.name not in _OF_THE_WINDOW | {"environment_turn"}]
 
 

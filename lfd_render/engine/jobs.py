@@ -71,7 +71,9 @@ class QuiltPicture:
 
 @dataclass(frozen=True)
 class SceneFacts:
-    """What a scene holds, as JSON."""
+    """What a scene holds, as JSON. digest: with a hash of all of it."""
+
+    digest: bool = False
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,7 @@ class Job:
         """What decides whether a process can go on with what it has on the device."""
         still = replace(
             self.choices, camera=None, focus_distance=None, yaw=0.0, pitch=0.0, depth_scale=1.0,
-            exposure=None,
+            dolly=0.0, exposure=None,
         )  # fmt: skip
         return _digest(self._scene_id, self._display, still)
 

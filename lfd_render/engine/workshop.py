@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from lfd_render.display import DisplayProfile, Rig
 from lfd_render.display.mount import stored
 from lfd_render.engine import encoding
+from lfd_render.engine.digests import scene_digest
 from lfd_render.engine.jobs import (
     AllViews,
     Holds,
@@ -87,7 +88,7 @@ class Workshop:
             case QuiltPicture():
                 result = self._quilt(job, job.product, progress, spans)
             case SceneFacts():
-                result = self._facts(job, spans)
+                result = self._facts(job, job.product, spans)
             case ViewMap():
                 result = _view_map(job, spans)
             case Pattern():
@@ -240,7 +241,7 @@ class Workshop:
             "warnings": list(self._renderer.warnings),
         }
 
-    def _facts(self, job: Job, spans: Spans) -> Result:
+    def _facts(self, job: Job, asked: SceneFacts, spans: Spans) -> Result:
         scene = self._scene(job, spans)
         low, high = scene.bounds()
         hint = exposure_hint(scene)
@@ -255,6 +256,8 @@ class Workshop:
             "bytes": scene_bytes(scene),
             "warnings": [*scene.warnings, *([hint] if hint else [])],
         }
+        if asked.digest:
+            facts["digest"] = scene_digest(scene)
         return Result(b"", encoding.JSON, facts, spans.ms)
 
 

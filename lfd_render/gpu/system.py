@@ -35,6 +35,7 @@ _EGL_VERSION = 0x3054
 _EGL_EXTENSIONS = 0x3055
 _EGL_PLATFORM_DEVICE = 0x313F
 _EGL_DRM_DEVICE_FILE = 0x3233
+_EGL_CUDA_DEVICE = 0x323A  # EGL_NV_device_cuda
 _MAX_DEVICES = 32
 
 
@@ -53,12 +54,20 @@ class EglDevice:
 def egl_devices() -> list[EglDevice]:
     """All EGL devices in EGL's order. Raises OSError when libEGL.so.1 cannot be loaded."""
     egl = _load_egl()
-    handles = (ctypes.c_void_p * _MAX_DEVICES)()
-    count = ctypes.c_int(0)
-    query = _extension(egl, "eglQueryDevicesEXT", ctypes.c_uint, 3)
-    if query is None or not query(_MAX_DEVICES, handles, ctypes.byref(count)):
-        return []
-    return [_describe(egl, index, handles[index]) for index in range(count.value)]
+    return [_describe(egl, index, handle) for index, handle in enumerate(_handles(egl))]
+
+
+def egl_index_of_cuda(cuda: int) -> int | None:
+    """The place in EGL's list of a CUDA device, whose order differs; None where it has none."""
+    egl = _load_egl()
+    attribute = _extension(egl, "eglQueryDeviceAttribEXT", ctypes.c_uint, 3)
+    number = ctypes.c_ssize_t()
+    for index, handle in enumerate(_handles(egl)):
+        # Devices that are not NVIDIA's know no such attribute.
+        known = attribute and attribute(handle, _EGL_CUDA_DEVICE, ctypes.byref(number))
+        if known and number.value == cuda:
+            return index
+    return None
 
 
 def gl_problem() -> str | None:
@@ -119,6 +128,16 @@ def _extension(egl: ctypes.CDLL, name: str, result: Any, arguments: int) -> Any:
     if not address:
         return None
     return ctypes.CFUNCTYPE(result, *[ctypes.c_void_p] * arguments)(address)
+
+
+def _handles(egl: ctypes.CDLL) -> list[int | None]:
+    """What EGL calls its devices."""
+    handles = (ctypes.c_void_p * _MAX_DEVICES)()
+    count = ctypes.c_int(0)
+    query = _extension(egl, "eglQueryDevicesEXT", ctypes.c_uint, 3)
+    if query is None or not query(_MAX_DEVICES, handles, ctypes.byref(count)):
+        return []
+    return handles[: count.value]
 
 
 def _describe(egl: ctypes.CDLL, index: int, handle: int | None) -> EglDevice:

@@ -64,6 +64,15 @@ def test_yaw_brings_the_right_hand_side_forward() -> None:
     assert right == pytest.approx([half * math.cos(math.pi / 6), 0, half / 2])
 
 
+def test_dolly_brings_the_scene_forward_along_the_viewers_axis() -> None:
+    camera = Camera((1, 2, 3), (1, -2, 0.5), (0.1, 1, 0.3), 4.0, depth_scale=0.5).turned(0.7, 0.3)
+    moved = camera.dollied(0.25).display_from_world((40.0, 20.0))
+    shift = moved - camera.display_from_world((40.0, 20.0))
+    expected = np.zeros((4, 4))
+    expected[2, 3] = 0.25 * 20.0 * 0.5  # heights, panel height, depth scale
+    assert np.allclose(shift, expected, atol=1e-12)  # rounding of lengths of some tens
+
+
 def test_depth_scale_acts_about_the_window_after_the_turn() -> None:
     camera = Camera.from_json_dict(FRONT).turned(math.pi / 2).with_depth_scale(0.5)
     (right,) = to_display(camera, (1, 0, 0))
