@@ -39,11 +39,16 @@ def _ray_problem() -> str | None:
     return None if importlib.util.find_spec("ray") else "ray is not installed (extra [ray])"
 
 
+def _video_problem() -> str | None:
+    return None if importlib.util.find_spec("av") else "PyAV is not installed (extra [video])"
+
+
 PROBLEMS: dict[str, Callable[[], str | None]] = {
     "gl": system.gl_problem,
     "zink": _zink_problem,
     "browser": system.browser_problem,
     "ray": _ray_problem,
+    "video": _video_problem,
 }
 
 

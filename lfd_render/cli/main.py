@@ -25,6 +25,7 @@ from lfd_render.cli.quilt import quilt
 from lfd_render.cli.render import render
 from lfd_render.cli.serve import serve
 from lfd_render.cli.unweave import unweave
+from lfd_render.cli.video import video
 from lfd_render.cli.views import views
 from lfd_render.cli.weave import weave
 from lfd_render.errors import (
@@ -42,7 +43,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]}
 )
 for command in (
-    render, animate, views, quilt, weave, unweave, look, compare, bench, serve, demo, doctor,
+    render, animate, views, quilt, weave, unweave, look, compare, video, bench, serve,
+    demo, doctor,
 ):  # fmt: skip
     app.command()(command)
 app.add_typer(display)

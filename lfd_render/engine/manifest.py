@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from lfd_render.errors import OutputError
+from lfd_render.errors import LfdError, OutputError
 
 MANIFEST = "manifest.jsonl"
 SCHEMA = "lfd-sequence/1"
@@ -44,9 +44,9 @@ class Manifest:
         return self.head() + "".join(frame_line(name, sha) for name, sha in self.hashes.items())
 
     @staticmethod
-    def parse(text: str, source: str) -> Manifest:
+    def parse(text: str, source: str, error: type[LfdError] = OutputError) -> Manifest:
         """The manifest of a file's text; a last line without its end is left out. Raises
-        OutputError for anything else that is none."""
+        `error` for anything else that is none."""
         lines = text.split("\n")[:-1]
         try:
             head = json.loads(lines[0])
@@ -54,7 +54,7 @@ class Manifest:
             if schema != SCHEMA or not isinstance(settings, dict):
                 raise ValueError
         except (IndexError, ValueError, KeyError, TypeError):
-            raise OutputError(
+            raise error(
                 f"{source}: line 1: is not the head of a '{SCHEMA}' manifest; "
                 "give a folder that 'animate' made, or another one"
             ) from None
@@ -64,7 +64,7 @@ class Manifest:
                 frame = json.loads(line)
                 manifest.hashes[str(frame["file"])] = str(frame["sha256"])
             except (ValueError, KeyError, TypeError):
-                raise OutputError(
+                raise error(
                     f"{source}: line {number}: '{line[:60]}' tells of no frame; remove the line, "
                     "and --resume makes its frame again"
                 ) from None

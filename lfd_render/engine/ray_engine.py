@@ -86,7 +86,7 @@ class RayEngine:
             _check_reachable(self._address)
         else:
             _lock_up()
-        import ray  # noqa: PLC0415 (an extra, which reads how it is locked up when imported)
+        ray = _ray()
 
         where = self._address or "local"
         self._aside.__enter__()
@@ -128,7 +128,7 @@ class RayEngine:
 
     def results(self, jobs: Iterable[tuple[int, Job]]) -> Iterator[tuple[int, Result]]:
         """Results under the numbers of their jobs, as they come. Raises the jobs' errors."""
-        import ray  # noqa: PLC0415 (an extra)
+        ray = _ray()
 
         jobs = iter(jobs)
         running: dict[Any, tuple[Any, int]] = {}  # task → actor and number
@@ -141,7 +141,7 @@ class RayEngine:
             yield number, _got(task)
 
     def _end(self) -> None:
-        import ray  # noqa: PLC0415 (an extra)
+        ray = _ray()
 
         for actor in self._actors:
             with suppress(Exception):
@@ -158,9 +158,9 @@ class RayEngine:
 
     def _start(self) -> None:
         """Make the actors, and wait until each has its context."""
-        import ray  # noqa: PLC0415 (an extra)
+        ray = _ray()
 
-        resources = ray.cluster_resources()  # type: ignore[no-untyped-call]
+        resources = ray.cluster_resources()
         gpus = 0 if self._device == "software" else int(resources.get("GPU", 0))
         cores = int(resources.get("CPU", 1))
         count = self._processes or (2 * gpus if gpus else max(1, cores // 2))
@@ -189,9 +189,16 @@ class RayEngine:
             self._renderers.add(renderer)
 
 
+def _ray() -> Any:
+    """The extra, which reads how it is locked up when it is imported."""
+    import ray  # noqa: PLC0415
+
+    return ray
+
+
 def _got(task: Any) -> Any:
     """What a task gave. Raises the error that it met, as it was there."""
-    import ray  # noqa: PLC0415 (an extra)
+    ray = _ray()
 
     try:
         return ray.get(task)
@@ -216,7 +223,7 @@ def _in_constructor(error: BaseException) -> LfdError | None:
 
 def _egl_device(device: str) -> str:
     """The EGL device of the GPU that Ray gave this actor; as asked for where it gave none."""
-    import ray  # noqa: PLC0415 (an extra)
+    ray = _ray()
 
     given = ray.get_runtime_context().get_accelerator_ids().get("GPU", [])
     if not given or device not in ("auto", "gpu"):
