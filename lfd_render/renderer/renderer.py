@@ -329,7 +329,7 @@ class Renderer:
         """One rendering call: nothing of it stays on the device when it fails."""
         self.device.activate()
         self.device.ledger.restart_peak()
-        before = set(self.device.owned)
+        before = self._standing()
         try:
             with self.device.undoing():
                 yield
@@ -337,11 +337,15 @@ class Renderer:
             # What a bad scene, pose or camera, or one who leaves, finds standing stands, unless
             # something was replaced.
             harmless = isinstance(error, SceneError | UsageError | CancelledError)
-            if not (harmless and set(self.device.owned) == before):
+            if not (harmless and self._standing() == before):
                 self._end_stage()  # they may be among what was undone
                 self._drop_scene()
                 self._drop_environment()
             raise
+
+    def _standing(self) -> tuple[object, ...]:
+        """What is on the device, and what this renderer takes to be there."""
+        return set(self.device.owned), self._buffers, self._environment_map, self._stage
 
     def _upload(self, scene: Scene, choice: RenderOptions, timings: Timings) -> SceneBuffers:
         """The scene under its light; what is on the device already stays there."""

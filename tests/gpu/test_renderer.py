@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lfd_render.display import Camera, DisplayProfile
-from lfd_render.errors import GpuError, LfdError, ResourceError, UsageError
+from lfd_render.errors import CancelledError, GpuError, LfdError, ResourceError, UsageError
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.memory import Buffer, Ledger
 from lfd_render.passes.encode import Encode
@@ -292,3 +292,18 @@ def test_a_wall_beyond_the_window_fills_the_panel(
     with Renderer(device) as renderer:
         pixels = renderer.render(scene, display, camera, views=48, technique=technique).pixels
     assert pixels.min() > 200
+
+
+def test_a_first_call_that_is_called_off_leaves_nothing_in_use(
+    device: Device, spheres: Scene, display: DisplayProfile
+) -> None:
+    """What it had put on the device is undone, and so must not be taken to be there."""
+
+    def leave(part: float) -> None:
+        raise CancelledError("called off")
+
+    renderer = Renderer(device)
+    with pytest.raises(CancelledError):
+        renderer.views(spheres, display, **SMALL, progress=leave)
+    found = renderer.views(spheres, display, **SMALL)
+    assert np.array_equal(found, Renderer(device).views(spheres, display, **SMALL))
