@@ -25,7 +25,7 @@ CHECKS = [
 ]  # fmt: skip
 
 
-def fuzz(server: Server, *arguments: str, **settings: str) -> tuple[int, str]:
+def fuzz(server: Server, folder: Path, *arguments: str, **settings: str) -> tuple[int, str]:
     """How many cases schemathesis sent, and what it says if it found anything."""
     done = subprocess.run(
         [
@@ -37,7 +37,7 @@ def fuzz(server: Server, *arguments: str, **settings: str) -> tuple[int, str]:
         text=True,
         check=False,
         env=os.environ | settings | HOOKS,
-        cwd=HERE,
+        cwd=folder,  # where it leaves what it remembers
     )  # fmt: skip
     cases = re.search(r"(\d+) generated", done.stdout)
     assert cases, done.stdout + done.stderr
@@ -46,32 +46,35 @@ def fuzz(server: Server, *arguments: str, **settings: str) -> tuple[int, str]:
 
 @pytest.mark.shows("schemathesis, all phases: no 5xx, no undocumented status")
 def test_no_request_is_answered_by_an_undescribed_status(
-    start: Start, scaled: Callable[[int, int], int], measured: Callable[[str, str], None]
-) -> None:
+    start: Start, tmp_path: Path, scaled: Callable[[int, int], int],
+    measured: Callable[[str, str], None],
+) -> None:  # fmt: skip
     phases = "examples,coverage,fuzzing,stateful"
     each = scaled(2500, 5)
     with start("--processes", "1", python_path=HERE / "cheap") as server:
-        cases, found = fuzz(server, "--phases", phases, "--max-examples", str(each))
+        cases, found = fuzz(server, tmp_path, "--phases", phases, "--max-examples", str(each))
     assert not found, found
     assert cases >= scaled(100_000, 5000)
     assert not [line for line in server.log if '"level": "error"' in line]
     measured("requests of all phases", f"{cases}, no 5xx, no undocumented status")
 
 
-def test_pictures_that_are_rendered(start: Start, scaled: Callable[[int, int], int]) -> None:
+def test_pictures_that_are_rendered(
+    start: Start, tmp_path: Path, scaled: Callable[[int, int], int]
+) -> None:
     with start("--processes", "1") as server, server.client() as client:
         client.put("/v1/displays/small", json=PROFILE)
         drawn = ["--include-path-regex", "/(eia|look|view|views|quilt|stream|render)$"]
         cases, found = fuzz(
-            server, "--phases", "examples,fuzzing", "--max-examples", str(scaled(500, 3)),
+            server, tmp_path, "--phases", "examples,fuzzing", "--max-examples", str(scaled(500, 3)),
             "--exclude-method", "HEAD", *drawn, LFD_FUZZ_SMALL="1",
         )  # fmt: skip
     assert not found, found
     assert cases >= scaled(3000, 18)
 
 
-def test_a_planted_fault_is_found(start: Start) -> None:
+def test_a_planted_fault_is_found(start: Start, tmp_path: Path) -> None:
     with start("--processes", "1", python_path=HERE / "faults") as server:
         broken = ["--phases", "coverage", "--include-path", "/v1/render", "--mode", "positive"]
-        _, found = fuzz(server, *broken, LFD_FUZZ_SEED=str(BREAK))
+        _, found = fuzz(server, tmp_path, *broken, LFD_FUZZ_SEED=str(BREAK))
     assert "Server error" in found
