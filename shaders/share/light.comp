@@ -36,8 +36,8 @@ void main() {
     uint steps = track.view_steps >> STEPS_SHIFT;
     float along = clamp((at - track.from) * track.steps_per_column, 0.0, float(steps)), before = floor(along);
     uint first = track.first_cell, cell = min(uint(before), max(steps, 1u) - 1u), next = min(cell + 1u, steps);
-    Matte matte = interpolated(matte_from(cells[first + max(cell, 1u) - 1u]), matte_from(cells[first + cell]), matte_from(cells[first + next]),
-                               matte_from(cells[first + min(cell + 2u, steps)]), along - float(cell));
+    vec3 previous = radiance_from(cells[first + max(cell, 1u) - 1u].xy), following = radiance_from(cells[first + min(cell + 2u, steps)].xy);
+    Matte matte = interpolated(previous, matte_from(cells[first + cell]), matte_from(cells[first + next]), following, along - float(cell));
 
     int row = frame.band_first + pixel.y;
     vec2 window = vec2((column - row_offsets[row]) * frame.column_mm, row_centre_mm(row));

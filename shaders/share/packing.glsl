@@ -24,26 +24,16 @@ Matte matte_from(uvec4 words) {
                  float(words.w >> 24) * (1.0 / 255.0), (words.z & 1u << 30) != 0u, 1.0);
 }
 
-// Adds a part of one to another.
-void add(inout Matte sum, Matte matte, float weight) {
-    sum.radiance += weight * matte.radiance;
-    sum.normal += weight * matte.normal;
-    sum.f0 += weight * matte.f0;
-    sum.roughness += weight * matte.roughness;
-    sum.occlusion += weight * matte.occlusion;
+vec3 radiance_from(uvec2 words) {
+    return vec3(unpackHalf2x16(words.x), unpackHalf2x16(words.y).x);
 }
 
-// What lies t of the way from b to c, of four in a row: Catmull and Rom's cubic, which keeps detail that a straight line
-// between two would blur.
-Matte interpolated(Matte a, Matte b, Matte c, Matte d, float t) {
-    Matte sum = Matte(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0, b.glossy, 1.0);
-    add(sum, a, t * (-0.5 + t * (1.0 - 0.5 * t)));
-    add(sum, b, 1.0 + t * t * (-2.5 + 1.5 * t));
-    add(sum, c, t * (0.5 + t * (2.0 - 1.5 * t)));
-    add(sum, d, t * t * (-0.5 + 0.5 * t));
-    sum.radiance = max(sum.radiance, 0.0);
-    sum.normal *= inversesqrt(max(dot(sum.normal, sum.normal), 1e-20));
-    sum.f0 = max(sum.f0, 0.0);
-    sum.roughness = clamp(sum.roughness, 0.0, 1.0);
-    return sum;
+// Between b and c, t of the way; radiance, which has the finest detail, by Catmull and Rom's cubic through the radiance of
+// their neighbours a and d, too, since a straight line blurs.
+Matte interpolated(vec3 a, Matte b, Matte c, vec3 d, float t) {
+    vec3 radiance = b.radiance + 0.5 * t * (c.radiance - a + t * (2.0 * a - 5.0 * b.radiance + 4.0 * c.radiance - d
+                                                                  + t * (3.0 * (b.radiance - c.radiance) + d - a)));
+    vec3 normal = mix(b.normal, c.normal, t);
+    return Matte(max(radiance, 0.0), normal * inversesqrt(max(dot(normal, normal), 1e-20)), mix(b.f0, c.f0, t),
+                 mix(b.roughness, c.roughness, t), mix(b.occlusion, c.occlusion, t), b.glossy, 1.0);
 }
