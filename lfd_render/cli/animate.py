@@ -114,7 +114,8 @@ def animate(
         typer.Option(
             min=1,
             max=1024,
-            help="How many render at once; else 2, or as many as the cluster has room for.",
+            help="How many render at once; else 2 before a GPU, 1 in software, on Ray as many as "
+            "there is room for.",
         ),
     ] = None,
     resume: Annotated[

@@ -10,8 +10,7 @@ from lfd_render.engine.jobs import Job, Result
 from lfd_render.engine.local import LocalEngine
 from lfd_render.engine.sequence import Sequence
 from lfd_render.errors import OptionError
-
-_LOCAL_PROCESSES = 2  # while one encodes, the other renders
+from lfd_render.gpu.system import egl_devices
 
 
 class Engine(Protocol):
@@ -44,10 +43,22 @@ def open_engine(
     """The engine of ``local``, ``ray`` or ``ray://HOST:PORT``. url: where those that render may
     write the sequence's frames themselves. Raises OptionError, GpuError."""
     if text == "local":
-        return LocalEngine(device, processes or _LOCAL_PROCESSES)
+        return LocalEngine(device, processes or _processes_for(device))
     if text != "ray" and not text.startswith("ray://"):
         raise OptionError("engine", f"'{text}'; give local, ray or ray://HOST:PORT")
 
     from lfd_render.engine.ray_engine import RayEngine  # noqa: PLC0415 (an extra)
 
     return RayEngine(None if text == "ray" else text, device, processes, url, sequence)
+
+
+def _processes_for(device: str) -> int:
+    """Two before a graphics card: while one encodes, the other renders. In software one frame keeps
+    all cores busy, and a second process only adds its start."""
+    try:
+        devices = egl_devices()
+    except OSError:
+        return 1  # whose start tells what is missing
+    hardware = {str(found.index) for found in devices if found.usable and not found.software}
+    asked = {device} if device.isdecimal() else hardware
+    return 2 if device != "software" and hardware & asked else 1

@@ -56,7 +56,8 @@ class LocalEngine:
     @property
     def name(self) -> str:
         """Where frames are rendered."""
-        return f"{self._processes} processes on {self._pool.renderers[0]}"
+        processes = f"{self._processes} process{'es' if self._processes > 1 else ''}"
+        return f"{processes} on {self._pool.renderers[0]}"
 
     def facts(self, job: Job) -> dict[str, Any]:
         """What the scene holds; all processes load it at once. Raises the job's errors."""

@@ -100,7 +100,10 @@ class RayEngine:
         except Exception as error:  # connection, version and token errors have no common class
             self._aside.__exit__(None, None, None)
             reason = " ".join(str(error).split())[:300]
-            raise OptionError("engine", f"'{where}': no Ray there: {reason}") from error
+            raise OptionError(
+                "engine",
+                f"'{where}': no Ray there that knows the token of RAY_AUTH_TOKEN: {reason}",
+            ) from error
         try:
             self._start()
         except BaseException:
@@ -119,7 +122,8 @@ class RayEngine:
     @property
     def name(self) -> str:
         """Where frames are rendered."""
-        return f"{len(self._actors)} Ray actors on {', '.join(sorted(self._renderers))}"
+        actors = f"{len(self._actors)} Ray actor{'s' if len(self._actors) > 1 else ''}"
+        return f"{actors} on {', '.join(sorted(self._renderers))}"
 
     def facts(self, job: Job) -> dict[str, Any]:
         """What the scene holds; all actors load it at once. Raises the job's errors."""

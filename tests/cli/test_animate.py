@@ -56,7 +56,7 @@ def bytes_of(folder: Path) -> list[bytes]:
 def whole(display: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of four frames."""
     folder = tmp_path_factory.mktemp("whole") / "frames"
-    run("animate", SCENE, "-o", folder, "-d", display, *MOVING, "--frames", "0:3")
+    run("animate", SCENE, "-o", folder, "-d", display, *MOVING, "--frames", "0:3", "--processes", 2)
     return folder
 
 
@@ -78,6 +78,7 @@ def test_a_sequence_survives_kill_9(
     count, kills = scaled(60, 16), scaled(5, 2)
     folder, straight = tmp_path / "killed", tmp_path / "straight"
     arguments = ("animate", SCENE, "-d", display, *MOVING, "--frames", f"0:{count - 1}")
+    arguments = (*arguments, "--processes", 2)
     seen: dict[str, tuple[int, int]] = {}  # file by file, what a rewrite would change
     for kill in range(kills):
         process = begun(*arguments, "-o", folder, *(["--resume"] if kill else []))

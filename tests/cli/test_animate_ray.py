@@ -98,3 +98,19 @@ def test_ray_is_an_extra(
     result = command("animate", SCENE, *MOVING, *given)
     assert result.code == 2
     assert "ray is not installed; pip install 'lfd-render[ray]'" in result.error
+
+
+@pytest.mark.needs("ray")
+def test_ray_accepts_the_cluster_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import yaml  # noqa: PLC0415 (comes with Ray)
+    from ray.autoscaler._private.util import prepare_config, validate_config  # noqa: PLC0415
+
+    monkeypatch.setenv("RAY_TMPDIR", str(tmp_path))  # where it keeps what it knows of clusters
+    file = Path(__file__).resolve().parents[2] / "deploy" / "ray-cluster.yaml"
+    cluster = yaml.safe_load(file.read_text(encoding="utf-8"))
+    starts = cluster["head_start_ray_commands"] + cluster["worker_start_ray_commands"]
+    assert all("RAY_AUTH_MODE=token" in line for line in starts if " start " in line)
+    validate_config(prepare_config(cluster))
+    cluster["workers"] = 2
+    with pytest.raises(Exception, match="workers"):
+        validate_config(prepare_config(cluster))
