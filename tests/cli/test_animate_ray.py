@@ -65,14 +65,14 @@ def test_an_actor_dies(
         actors = painters(driver.pid)
         there = len(frames(folder))
         os.kill(actors[0], signal.SIGKILL)
-        out, said = driver.communicate(timeout=60)
+        out, said = driver.communicate(timeout=180)
     assert driver.returncode == 0, said
     assert len(actors) == 2
     assert "A worker died" in said  # Ray's own words, kept off stdout
     assert there < count
     assert json.loads(out)["made"] == count
     with begun(*arguments, "-o", f"file://{url}") as local:
-        assert local.wait(60) == 0
+        assert local.wait(180) == 0
     assert len(frames(folder)) == count
     assert frames(folder) == frames(url)
     measured("frames on Ray", f"{count} of {count}, an actor killed after {there}")
