@@ -19,6 +19,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from lfd_render.engine import encoding
 from lfd_render.engine.jobs import Job, Result
+from lfd_render.engine.motion import to_and_fro, turned
 from lfd_render.engine.pool import InternalError
 from lfd_render.errors import BusyError, LfdError
 
@@ -48,11 +49,11 @@ class Moving(BaseModel):
 
     def turned(self, frame: int) -> float:
         """Degrees of a full turn."""
-        return 360.0 * (frame / self.fps / self.period % 1.0)
+        return turned(frame / self.fps, self.period)
 
     def swung(self, frame: int) -> float:
         """Degrees to the right of the middle."""
-        return self.swing * math.sin(math.radians(self.turned(frame)))
+        return self.swing * to_and_fro(frame / self.fps, self.period)
 
 
 class SeenQuery(LookQuery, Moving):

@@ -38,10 +38,10 @@ class Motion:
             case "orbit":
                 return replace(choices, yaw=choices.yaw + turned(seconds, self.period))
             case "sway":
-                away = self.swing * _to_and_fro(seconds, self.period)
+                away = self.swing * to_and_fro(seconds, self.period)
                 return replace(choices, yaw=choices.yaw + away)
             case "dolly":
-                away = self.travel * _to_and_fro(seconds, self.period)
+                away = self.travel * to_and_fro(seconds, self.period)
                 return replace(choices, dolly=choices.dolly + away)
 
 
@@ -50,6 +50,6 @@ def turned(seconds: float, period: float) -> float:
     return 360.0 * (seconds / period % 1.0)
 
 
-def _to_and_fro(seconds: float, period: float) -> float:
+def to_and_fro(seconds: float, period: float) -> float:
     """From −1 to 1 and back, 0 at first."""
     return math.sin(math.radians(turned(seconds, period)))
