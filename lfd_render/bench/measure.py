@@ -206,7 +206,8 @@ class Bench:
             self._told(f"{group.scene}: standard of single views")
             rig = self._display.rig(group.views)
             # The extreme views are seen from the edge of the cone, where an eye is between two.
-            views = tuple(chosen_views(group.views, self._effort.compared + 2)[1:-1])
+            chosen = chosen_views(group.views, self._effort.compared + 2)
+            views = tuple(chosen[1:-1] or chosen)
             with Renderer(self._device) as judge:
                 pictures = tuple(
                     gold_standard(

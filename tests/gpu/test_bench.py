@@ -35,10 +35,15 @@ def display() -> DisplayProfile:
 
 
 def rows_of(
-    device: Device, display: DisplayProfile, *names: str, effort: Effort = EFFORT, suite: str = "aa"
+    device: Device,
+    display: DisplayProfile,
+    *names: str,
+    effort: Effort = EFFORT,
+    suite: str = "aa",
+    views: int = 12,
 ) -> dict[str, Row]:
     contenders = tuple(Contender(*name.split(",")) for name in names)
-    group = Group(suite, SCENE, 12, (1, 1), contenders, SIZE)
+    group = Group(suite, SCENE, views, (1, 1), contenders, SIZE)
     return {row.contender: row for row in Bench(device, display, effort).rows(group)}
 
 
@@ -70,6 +75,13 @@ def test_right_pictures_are_timed_frame_by_frame_in_turn(
     assert best_mvr(list(rows.values())) is rows["mvr:multipass"]
     # Each judged after a frame from elsewhere, then all in turn.
     assert order[6:] == ["lfdpr", "lfdpr", "mvr"] * 4
+
+
+def test_few_views_are_judged_by_all_there_are(device: Device, display: DisplayProfile) -> None:
+    effort = dataclasses.replace(EFFORT, rounds=1, warm_ups=0)
+    for views in (1, 2):
+        row = rows_of(device, display, "lfdpr", effort=effort, views=views)["lfdpr"]
+        assert (row.gap, row.fault, len(row.frames_ms)) == (None, None, 1)
 
 
 def nothing(technique: Lfdpr, band: Band, clock: StageClock) -> None:
