@@ -27,6 +27,7 @@ _LOOPBACK = ("localhost", "127.0.0.1", "[::1]")
 _ANY = ("0.0.0.0", "::")
 _MOST_BUCKETS = 10_000
 _BODY_BYTES = 4 << 20  # of anything but a scene
+_LEAST_BYTES_A_S = 1 << 14  # of a body, on the whole
 _MULTIPART_BYTES = 1 << 20  # what headers of parts may take besides the files
 
 
@@ -170,14 +171,15 @@ class Bodies:
             error.headers = {"Connection": "close"}
             await refuse(scope, receive, send, error)
             return
-        received, whole = 0, False
+        received, whole, began = 0, False, time.monotonic()
 
         async def counted() -> Message:
             nonlocal received, whole
             if whole:
                 return await receive()
             try:
-                async with asyncio.timeout(self._idle_s):
+                in_time = began + self._idle_s + received / _LEAST_BYTES_A_S - time.monotonic()
+                async with asyncio.timeout(min(self._idle_s, in_time)):
                     message = await receive()
             except TimeoutError:
                 raise ProblemError(408, "the body stopped coming; send it again") from None

@@ -47,6 +47,7 @@ class StoredJob:
         self.finished: float | None = None
         self.kept: dict[int, Kept] = {}  # by the picture's number
         self.problem: ProblemError | None = None
+        self.expiry: asyncio.TimerHandle | None = None
         self._parts: dict[int, float] = {}  # done of the pictures that are being made
         self._changed = asyncio.Event()
 
@@ -187,7 +188,9 @@ class JobStore:
         finally:
             stored.end("cancelled")
             self._tasks.pop(stored.id, None)
-        asyncio.get_running_loop().call_later(self._settings.job_keep_s, self._forget, stored)
+        if stored.id in self._jobs:
+            loop = asyncio.get_running_loop()
+            stored.expiry = loop.call_later(self._settings.job_keep_s, self._forget, stored)
 
     async def _lane(self, stored: StoredJob, numbers: Iterator[int]) -> None:
         for number in numbers:
@@ -235,6 +238,8 @@ class JobStore:
         if self._jobs.pop(stored.id, None) is None:
             return
         self._keys = {k: v for k, v in self._keys.items() if v[1] != stored.id}
+        if stored.expiry:
+            stored.expiry.cancel()  # which else would hold it in memory until then
         stored.end("cancelled")
         task = self._tasks.pop(stored.id, None)
         if task is None:

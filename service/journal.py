@@ -21,6 +21,7 @@ from .problems import problem
 _log = logging.getLogger("lfd_render.service")
 _OURS = ("lfd_render", "uvicorn.error")
 _CLIENT_GONE = 499
+_METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS")  # others make no series of their own
 _PLAIN = set(vars(logging.makeLogRecord({}))) | {"message", "asctime", "color_message"}
 
 
@@ -109,5 +110,6 @@ class Journal:
 
     def _count(self, scope: Scope, status: int, seconds: float) -> None:
         route = getattr(scope.get("route"), "path", "none")
-        self._metrics.requests.labels(route, scope["method"], str(status)).inc()
+        method = scope["method"] if scope["method"] in _METHODS else "other"
+        self._metrics.requests.labels(route, method, str(status)).inc()
         self._metrics.seconds.labels(route).observe(seconds)

@@ -57,8 +57,14 @@ class Problem(BaseModel):
         """As JSON says it."""
         return Problem(
             title=HTTPStatus(error.status_code).phrase, status=error.status_code,
-            detail=error.detail, field=error.field, request_id=request_id,
+            detail=_whole(error.detail), field=error.field and _whole(error.field),
+            request_id=request_id,
         )  # fmt: skip
+
+
+def _whole(text: str) -> str:
+    """A text without halves of characters, which UTF-8 does not hold."""
+    return text.encode("utf-8", "replace").decode()
 
 
 def as_problem(error: BaseException) -> ProblemError:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import asyncio
 import ctypes
 import logging
+import resource
 import socket
 import struct
 from collections.abc import Callable
+from contextlib import suppress
 
 import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 
 from lfd_render.errors import OutputError, UsageError
 
@@ -33,13 +36,15 @@ def run(settings: Settings, say: Callable[[str], None]) -> None:
         raise UsageError(
             f"--host: {settings.host}: others can reach it; set LFD_API_KEYS, or use 127.0.0.1"
         )
+    _take_descriptors()
     app = create_app(settings)
     with _listening(settings) as listener:
         host, port = listener.getsockname()[:2]
         said = f"[{host}]" if ":" in host else host
         server = _Server(
             uvicorn.Config(
-                app, log_config=None, access_log=False, server_header=False, lifespan="on",
+                app, http=_patient(settings.idle_s), lifespan="on",
+                log_config=None, access_log=False, server_header=False,
                 timeout_keep_alive=_KEEP_ALIVE_S,
                 timeout_graceful_shutdown=round(settings.drain_s) + 1,
                 ws_max_size=1 << 16, ws_per_message_deflate=False,
@@ -57,6 +62,14 @@ def run(settings: Settings, say: Callable[[str], None]) -> None:
         raise app.state.failure
 
 
+def _take_descriptors() -> None:
+    """As many open files as this process may have: sockets and large pictures take one each."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft != hard:
+        with suppress(ValueError, OSError):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+
+
 def _listening(settings: Settings) -> socket.socket:
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
     try:
@@ -69,6 +82,30 @@ def _listening(settings: Settings) -> socket.socket:
     # that never does would keep it for good.
     made.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1000 * settings.idle_s))
     return made
+
+
+def _patient(idle_s: float) -> type[H11Protocol]:
+    """HTTP that hangs up on clients who have not begun a request for so long, or not finished its
+    first lines. Bodies and answers have times of their own."""
+
+    class Patient(H11Protocol):
+        _last: RequestResponseCycle | None = None  # when it was looked at last
+
+        def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+            super().connection_made(transport)
+            self.loop.call_later(idle_s, self._look)
+
+        def _look(self) -> None:
+            if self.transport.is_closing() or self.transport.get_protocol() is not self:
+                return  # gone, or become a WebSocket
+            waiting = self.cycle is None or self.cycle.response_complete
+            if waiting and self.cycle is self._last:
+                self.transport.abort()
+                return
+            self._last = self.cycle
+            self.loop.call_later(idle_s, self._look)
+
+    return Patient
 
 
 class _Server(uvicorn.Server):

@@ -150,7 +150,13 @@ class SceneStore:
         folder.mkdir(parents=True, exist_ok=True)
         for left in folder.glob(".*"):  # of a server that was ended
             shutil.rmtree(left, ignore_errors=True)
-        self._scenes = {scene.id: scene for scene in map(_read, folder.iterdir()) if scene}
+        self._scenes: dict[str, StoredScene] = {}
+        for left in folder.iterdir():
+            scene = _read(left)
+            if scene and scene.id == left.name:
+                self._scenes[scene.id] = scene
+            else:  # of a server that was ended while it deleted it
+                shutil.rmtree(left, ignore_errors=True)
         self._gone: dict[str, Path] = {}  # deleted, still leased
 
     def all(self) -> list[StoredScene]:
@@ -192,18 +198,14 @@ class SceneStore:
             self._gone[scene_id] = folder
             (folder / "scene.json").unlink(missing_ok=True)
         else:
-            shutil.rmtree(folder, ignore_errors=True)
+            gone = self._folder / f".{uuid.uuid4().hex}"
+            folder.rename(gone)  # at once, whenever the server is ended
+            shutil.rmtree(gone, ignore_errors=True)
 
     @contextmanager
     def upload(self) -> Iterator[Upload]:
         """A place for a new scene's files, removed unless it is added. Raises ProblemError."""
         settings = self._settings
-        held = sum(sum(scene.files.values()) for scene in self._scenes.values())
-        if len(self._scenes) >= settings.max_scenes or held >= settings.max_scenes_mb << 20:
-            raise ProblemError(
-                507, f"{len(self._scenes)} scenes of {held} bytes are kept; delete one first",
-                "scenes",
-            )  # fmt: skip
         folder = self._folder / f".{uuid.uuid4().hex}"
         (folder / "files").mkdir(parents=True)
         try:
@@ -220,6 +222,13 @@ class SceneStore:
         scene = StoredScene(upload.id(main), main, upload.files, time.time(), facts)
         if scene.id in self._scenes:
             return self._scenes[scene.id], False
+        held = sum(sum(scene.files.values()) for scene in self._scenes.values())
+        most = self._settings
+        if len(self._scenes) >= most.max_scenes or held >= most.max_scenes_mb << 20:
+            raise ProblemError(
+                507, f"{len(self._scenes)} scenes of {held} bytes are kept; delete one first",
+                "scenes",
+            )  # fmt: skip
         (upload.folder.parent / "scene.json").write_text(json.dumps(asdict(scene)), "utf-8")
         gone = self._gone.pop(scene.id, None)
         if gone is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import AsyncIterator
 from typing import Annotated
 
@@ -170,6 +171,11 @@ async def _take(pieces: AsyncIterator[bytes], upload: Upload, name: str) -> None
 
 async def _take_form(request: Request, upload: Upload) -> str | None:
     """Take the files of a form; the one that it says is the scene."""
+    charset = re.search(r'charset="?([^";\s]*)', request.headers["content-type"], re.IGNORECASE)
+    if charset and charset[1].lower() not in ("utf-8", "us-ascii"):
+        raise ProblemError(
+            415, f"Content-Type: charset '{charset[1][:40]}'; send utf-8", "Content-Type"
+        )
     form = await request.form(max_files=_MOST_PARTS, max_fields=8, max_part_size=1 << 16)
     try:
         main = None

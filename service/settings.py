@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from lfd_render.engine.pool import PoolSettings
 from lfd_render.engine.worker import WorkerConfig
@@ -80,6 +80,13 @@ class Settings(BaseModel):
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         "info", description="Least level that is logged: debug, info, warning or error."
     )
+
+    @field_validator("api_keys")
+    @classmethod
+    def _sendable(cls, keys: tuple[str, ...]) -> tuple[str, ...]:
+        if not all(key.isascii() and key.isprintable() for key in keys):
+            raise ValueError("a key is sent in a header; use letters, digits and signs of ASCII")
+        return keys
 
     @staticmethod
     def from_environment(environment: Mapping[str, str] = os.environ, **given: Any) -> Settings:

@@ -12,6 +12,8 @@ from multiprocessing.connection import Connection
 
 from lfd_render.errors import ResourceError
 
+LARGE = 1 << 20  # bytes of what stays where it came; each keeps a file descriptor
+
 
 def send_body(pipe: Connection, body: bytes | memoryview) -> None:
     """Send bytes after a message that says how many; nothing for none."""
@@ -37,10 +39,11 @@ def receive_body(pipe: Connection, size: int) -> memoryview:
         raise EOFError
     if not descriptors:
         raise ResourceError("too many open files; raise the limit or ask again later")
-    try:
-        return memoryview(mmap.mmap(descriptors[0], size, prot=mmap.PROT_READ))
-    finally:
-        os.close(descriptors[0])
+    with os.fdopen(descriptors[0], "rb") as memory:
+        if size < LARGE:  # many of these are kept
+            memory.seek(0)
+            return memoryview(memory.read(size))
+        return memoryview(mmap.mmap(memory.fileno(), size, prot=mmap.PROT_READ))
 
 
 def _write(descriptor: int, view: memoryview) -> None:

@@ -415,7 +415,9 @@ class Pool:
             self._dispatch()  # what waited for a lull
             now = time.monotonic()
             for process, ticket in self._busy.items():
-                late = ticket and now > ticket.deadline + self.settings.grace_s
+                # A job that waited long, or for an impatient client, has its time none the less.
+                allowed = ticket and max(ticket.deadline, ticket.started + self.settings.deadline_s)
+                late = allowed and now > allowed + self.settings.grace_s
                 large = limit and process.resident_bytes() > limit
                 if (late or large) and not process.condemned:
                     _log.warning(

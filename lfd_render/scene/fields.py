@@ -16,7 +16,14 @@ _SHOWN = 60  # characters of a wrong value that a message repeats
 def parse_json(data: bytes) -> Fields:
     """The JSON object in UTF-8 bytes; NaN, Infinity and anything else than an object is refused."""
     try:
-        return Fields(json.loads(data.decode("utf-8-sig"), parse_constant=_refuse_constant), "")
+        value = json.loads(data.decode("utf-8-sig"), parse_constant=_refuse_constant)
+        if b"\\u" in data:  # half of a character, which no file or answer can hold
+            json.dumps(value, ensure_ascii=False).encode()
+        return Fields(value, "")
+    except UnicodeEncodeError as error:
+        raise SceneError(
+            f"JSON: a text holds half a character ({error.object[error.start]!a}); give whole ones"
+        ) from None
     except UnicodeDecodeError as error:
         raise SceneError(
             f"JSON: byte {data[error.start]:#04x} at {error.start} is not UTF-8; "

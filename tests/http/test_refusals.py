@@ -162,6 +162,9 @@ def test_forms_are_checked(client: httpx.Client, triangle: bytes) -> None:
     wrong = client.post("/v1/scenes", files=[one], data={"main": "c.gltf"})
     assert problem(wrong, 422)["field"] == "main"
     problem(client.post("/v1/scenes", files=[("files", ("a.txt", b"x"))]), 422)
+    for charset in ("undefined", "utf-7", "unicode_escape"):
+        odd = {"Content-Type": f"multipart/form-data; boundary=x; charset={charset}"}
+        problem(client.post("/v1/scenes", content=b"--x\r\n", headers=odd), 415)
     broken = {"Content-Type": "multipart/form-data; boundary=x"}
     problem(client.post("/v1/scenes", content=b"--y\r\n", headers=broken), 400)
     problem(client.post("/v1/scenes", content=b"x", headers={"Content-Type": "text/plain"}), 415)
@@ -188,13 +191,24 @@ OBJ = b"mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 
         ({"a.glb": b""}, 422),
         ({"a.glb": b"glTF" + bytes(40)}, 422),
         ({"a.glb": bytes(3 << 20)}, 413),
+        ({"a.gltf": b'{"asset": {"version": "2.0"}, "cameras": [{"name": "\\ud800"}]}'}, 422),
         ({"a.gltf": b'{"asset": {"version": "2.0"}, "nodes": [{"children": [0]}]}'}, 422),
         ({"a.obj": b"f 1 2 3\n"}, 422),
         ({"a.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\n" + b"f 1 2 3\n" * 6000}, 413),
         ({"a.obj": OBJ, "a.mtl": b"newmtl m\nmap_Kd a.png\n", "a.png": png(4000, 4000)}, 413),
         ({"a.obj": OBJ, "a.mtl": b"newmtl m\nmap_Kd a.png\n", "a.png": b"II*\0" + bytes(90)}, 422),
     ],
-    ids=["empty", "no GLB", "large", "cycle", "no vertices", "triangles", "bomb", "TIFF"],
+    ids=[
+        "empty",
+        "no GLB",
+        "large",
+        "half a character",
+        "cycle",
+        "no vertices",
+        "triangles",
+        "bomb",
+        "TIFF",
+    ],
 )
 def test_bad_scenes_leave_nothing(
     client: httpx.Client, files: dict[str, bytes], status: int
@@ -214,6 +228,7 @@ def test_scenes_are_bounded(client: httpx.Client, triangle: bytes) -> None:
         content = triangle + b" " * number
         made.append(client.post("/v1/scenes", content=content, headers=GLTF).headers["location"])
     problem(client.post("/v1/scenes", content=triangle + b"    ", headers=GLTF), 507)
+    assert client.post("/v1/scenes", content=triangle, headers=GLTF).status_code == 200  # is there
     for place in made:
         assert client.delete(place).status_code == 204
 
@@ -320,10 +335,16 @@ def test_a_key_has_its_rate(guarded: Server) -> None:
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("PORT", "high"), ("PROCESSES", "0"), ("DEADLINE_S", "nan"), ("QUEUE", "-1")],
+    [
+        ("PORT", "high"),
+        ("PROCESSES", "0"),
+        ("DEADLINE_S", "nan"),
+        ("QUEUE", "-1"),
+        ("API_KEYS", "é"),
+    ],
 )
 def test_settings_are_checked(name: str, value: str) -> None:
-    with pytest.raises(UsageError, match=f"LFD_{name}: '{value}'"):
+    with pytest.raises(UsageError, match=f"LFD_{name}: .*'{value}'"):
         Settings.from_environment({f"LFD_{name}": value})
 
 

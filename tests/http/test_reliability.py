@@ -1,6 +1,7 @@
 """Under too much, too long, too little room, and at its end, the server loses nothing."""
 
 import asyncio
+import contextlib
 import json
 import os
 import resource
@@ -276,3 +277,53 @@ def test_the_end_under_load(
                 assert not thread.is_alive()
     measured("requests while the server was told to end", json.dumps(found))
     assert set(found) == {"200"}
+
+
+def test_clients_that_say_nothing_are_hung_up_on(start: Start) -> None:
+    """Silent ones, ones that end amid the first line, and ones whose body only drips."""
+    drip = b"POST /v1/scenes HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: model/gltf+json\r\n"
+    with start(python_path=CHEAP, idle_s=1) as server, server.client() as client:
+        where = (client.base_url.host, client.base_url.port)
+        with (
+            socket.create_connection(where, timeout=10) as silent,
+            socket.create_connection(where, timeout=10) as half,
+            socket.create_connection(where, timeout=10) as dripping,
+        ):
+            half.sendall(b"GET /livez HT")
+            dripping.sendall(drip + b"Content-Length: 1000\r\n\r\n")
+            started = time.monotonic()
+            dripping.settimeout(0.1)
+            answer = b""
+            while not answer and time.monotonic() - started < 8:
+                dripping.sendall(b" ")
+                try:
+                    answer = dripping.recv(100)
+                except TimeoutError:
+                    client.get("/livez").raise_for_status()  # one that asks is kept
+            assert answer.startswith(b"HTTP/1.1 408")
+            for mute in (silent, half):
+                with contextlib.suppress(ConnectionResetError):
+                    assert mute.recv(1) == b""
+
+
+def test_kept_pictures_keep_no_descriptors(start: Start) -> None:
+    with start(python_path=CHEAP) as server, server.client() as client:
+        place(client)
+        files = Path(f"/proc/{server.process.pid}/fd")
+        before = len(list(files.iterdir()))
+        for turn in range(40):
+            client.get(f"{PATH}/eia", params={"display": "small", "yaw": turn}).raise_for_status()
+        again = client.get(f"{PATH}/eia", params={"display": "small", "yaw": 3})
+        assert "frame" not in again.headers.get("server-timing", "")  # it was kept
+        assert len(list(files.iterdir())) < before + 20
+
+
+def test_what_a_killed_deletion_left_is_cleared(
+    start: Start, triangle: bytes, tmp_path: Path
+) -> None:
+    with start(python_path=CHEAP, data_dir=tmp_path) as server, server.client() as client:
+        scene = client.post("/v1/scenes", content=triangle, headers=GLTF).json()["id"]
+    (tmp_path / "scenes" / scene / "scene.json").unlink()
+    with start(python_path=CHEAP, data_dir=tmp_path) as server, server.client() as client:
+        assert client.get(f"/v1/scenes/{scene}").status_code == 404
+        assert client.post("/v1/scenes", content=triangle, headers=GLTF).status_code == 201
