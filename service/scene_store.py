@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import math
 import shutil
 import time
@@ -21,6 +22,8 @@ from lfd_render.scene.builtin import PREFIX, parse_builtin
 
 from .problems import ProblemError
 from .settings import Settings
+
+_log = logging.getLogger("lfd_render.service")
 
 SUFFIXES = (".glb", ".gltf", ".obj")
 _MOST_FILES = 512
@@ -155,8 +158,10 @@ class SceneStore:
             scene = _read(left)
             if scene and scene.id == left.name:
                 self._scenes[scene.id] = scene
-            else:  # of a server that was ended while it deleted it
+            elif _is_bare(left):  # of a server that was ended while it deleted it
                 shutil.rmtree(left, ignore_errors=True)
+            else:
+                _log.warning("scene cannot be read and is left alone", extra={"folder": left.name})
         self._gone: dict[str, Path] = {}  # deleted, still leased
 
     def all(self) -> list[StoredScene]:
@@ -252,6 +257,17 @@ def _builtin(scene_id: str, settings: Settings) -> SceneSource:
         if options.get(name, 0) > most:
             raise ProblemError(413, f"scene '{scene_id}': {name} is above {most}", "scene")
     return SceneSource(scene_id, scene_id, scene_id)
+
+
+def _is_bare(folder: Path) -> bool:
+    """Whether nothing tells of a scene there: not that it cannot be read now, or by this version."""
+    try:
+        (folder / "scene.json").lstat()
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+    return False
 
 
 def _read(folder: Path) -> StoredScene | None:

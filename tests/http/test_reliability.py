@@ -327,3 +327,20 @@ def test_what_a_killed_deletion_left_is_cleared(
     with start(python_path=CHEAP, data_dir=tmp_path) as server, server.client() as client:
         assert client.get(f"/v1/scenes/{scene}").status_code == 404
         assert client.post("/v1/scenes", content=triangle, headers=GLTF).status_code == 201
+
+
+def test_scenes_that_cannot_be_read_are_left_alone(
+    start: Start, triangle: bytes, tmp_path: Path
+) -> None:
+    """Another version's, say, whose facts have other names."""
+    with start(python_path=CHEAP, data_dir=tmp_path) as server, server.client() as client:
+        scene = client.post("/v1/scenes", content=triangle, headers=GLTF).json()["id"]
+    told = tmp_path / "scenes" / scene / "scene.json"
+    ours = told.read_text("utf-8")
+    told.write_text(json.dumps(json.loads(ours) | {"later": 1}), "utf-8")
+    with start(python_path=CHEAP, data_dir=tmp_path) as server, server.client() as client:
+        assert client.get(f"/v1/scenes/{scene}").status_code == 404
+        assert client.get("/v1/scenes").status_code == 200
+    told.write_text(ours, "utf-8")
+    with start(python_path=CHEAP, data_dir=tmp_path) as server, server.client() as client:
+        assert client.get(f"/v1/scenes/{scene}").status_code == 200
