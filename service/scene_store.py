@@ -260,7 +260,7 @@ def _builtin(scene_id: str, settings: Settings) -> SceneSource:
 
 
 def _is_bare(folder: Path) -> bool:
-    """Whether nothing tells of a scene there: not that it cannot be read now, or by this version."""
+    """Whether nothing tells of a scene there, readable or not."""
     try:
         (folder / "scene.json").lstat()
     except FileNotFoundError:
