@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -20,7 +21,7 @@ _DECLARATION = re.compile(r"\b(?:buffer|uniform)\s+(?:\w+\s+)?(\w+)\s*(?:\[[^\]]
 _IMAGE = re.compile(r"\bimage\w+\s+(\w+)\s*;")
 
 Uniform = int | float | tuple[Any, ...] | bytes
-Texture = TextureArray | TableTexture
+Texture = TextureArray | TableTexture | Buffer
 Samplers = Mapping[str, "Texture | list[TextureArray]"]
 
 
@@ -94,8 +95,11 @@ class _Program(Owned):
             group: Sequence[Texture] = textures if isinstance(textures, list) else [textures]
             for offset, texture in enumerate(group):
                 texture.bind(unit + offset)
-            units = list(range(unit, unit + len(group)))
-            self._program[name].value = units[0] if len(units) == 1 else units
+            # moderngl 5.13 does not know samplers of buffers.
+            units = (ctypes.c_int * len(group))(*range(unit, unit + len(group)))
+            self._device.raw.glProgramUniform1iv(
+                self._program.glo, self._program[name].location, len(group), units
+            )
             unit += len(group)
 
     def _free(self) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 # moderngl 5.13 has no internal format for arrays and no layered depth; these calls fill the gap.
 TEXTURE_2D = 0x0DE1
 TEXTURE_2D_ARRAY = 0x8C1A
+TEXTURE_BUFFER = 0x8C2A
 TEXTURE_CUBE_MAP = 0x8513
 TEXTURE_CUBE_MAP_SEAMLESS = 0x884F
 RGBA32UI = 0x8D70
@@ -87,6 +88,8 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "glGetIntegerv": (None, (_u, _p)),
     "glCreateTextures": (None, (_u, _i, _p)),
     "glDeleteTextures": (None, (_i, _p)),
+    "glProgramUniform1iv": (None, (_u, _i, _i, _p)),
+    "glTextureBuffer": (None, (_u, _u, _u)),
     "glTextureStorage2D": (None, (_u, _i, _u, _i, _i)),
     "glTextureSubImage2D": (None, (_u, _i, _i, _i, _i, _i, _u, _u, _p)),
     "glTextureStorage3D": (None, (_u, _i, _u, _i, _i, _i)),

@@ -15,6 +15,7 @@ from lfd_render.passes.splat import view_lanes
 from lfd_render.passes.view_buffers import ViewBuffers
 from lfd_render.passes.view_target import Band, ViewTarget
 
+MOST_LANE_VIEWS = 3  # that a lane takes, so that it loads a row of points once for all
 MOST_ITERATIONS = 65535  # llvmpipe ends an invocation's loops here, nested ones counted together
 
 
@@ -30,7 +31,7 @@ def iterations_left(each: int) -> int:
 
 
 class OwnedSplat:
-    """PointCloud, ViewTarget → SplitViewBuffers, with the bits that `Splat` finds by atomics."""
+    """PointCloud, ViewTarget → PackedViewBuffers, with the bits that `Splat` finds by atomics."""
 
     steps = range(1)
 
@@ -46,12 +47,15 @@ class OwnedSplat:
         """lod: one of LOD_RULES, for alpha."""
         self._scene = scene
         self._bin = Bin(device, scene, target)
-        self._lanes = view_lanes(target.rig.views)
+        views = target.rig.views
+        lane_views = min(MOST_LANE_VIEWS, -(-views // 8))
+        self._lanes = view_lanes(-(-views // lane_views))
+        self._view_blocks = -(-views // (self._lanes * lane_views))
         constants = {**scene.constants(), **lod_constants(lod), **sampling.constants()}
         tested = {batch.alpha_mode != "opaque" for batch in scene.batches}
+        columns = target.grid.columns * lane_views
         self._bin_items = {
-            key: iterations_left(target.grid.columns * column_loops(scene, tested=key) + 2)
-            for key in tested
+            key: iterations_left(columns * column_loops(scene, tested=key) + 2) for key in tested
         }
         self._kernels = {
             key: Kernel(
@@ -60,6 +64,7 @@ class OwnedSplat:
                 {
                     **constants,
                     "VIEW_LANES": self._lanes,
+                    "LANE_VIEWS": lane_views,
                     "BIN_ITEMS": self._bin_items[key],
                     "ALPHA_TESTED": int(key),
                 },
@@ -89,17 +94,16 @@ class OwnedSplat:
             **views.blocks(),
             "Draws": self._scene.draws,
             "FrameBlock": band.frame(batch),
-            "PointRows": self._bin.rows,
-            "WorkBlock": points.work,
             "Bins": self._bin.ends,
             "Eyes": band.target.eyes,
             "RowOffsets": band.target.row_offsets,
         }
-        groups = band.rows, -(-band.target.rig.views // self._lanes), 1
+        samplers = {**self._scene.samplers(), "binned_rows": self._bin.rows}
+        groups = band.rows, self._view_blocks, 1
         stride = coprime_stride(band.rows)
         for taken in range(0, self._bin.room(batch), self._bin_items[tested]):
-            uniforms = {"window": window, "taken": taken, "row_stride": stride}
-            kernel.set(buffers, uniforms, self._scene.samplers())
+            uniforms = {"taken": taken, "row_stride": stride}
+            kernel.set(buffers, uniforms, samplers)
             kernel.run(groups)
 
     def bin(self, batch: Batch, points: PointCloud, *, window: int, band: Band) -> None:

@@ -175,9 +175,9 @@ class SharedShade:
         )
         self._matte.run(groups)
         self._light.set(
-            {**frame, **listed, **cells, **eyes, **lighting.buffers(), "Depths": views.depths},
+            {**frame, **listed, **eyes, **lighting.buffers(), "Depths": views.depths},
             turn,
-            lighting.samplers(),
+            {**lighting.samplers(), "tracks": self._track_records, "cells": self._cells},
         )
         self._light.run_indirect(self._blocks.work)
 

@@ -1,6 +1,6 @@
 """The winner of each view pixel of a band, [row of the band, view, column].
 
-Two layouts of the same thing, by what the device's atomics can do.
+Two layouts of the same thing, by the width of the words that winners are compared by.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from lfd_render.gpu.programs import Kernel
 from lfd_render.passes.items import GROUPS_ACROSS
 from lfd_render.passes.view_target import ViewTarget
 
+INT64 = "GL_ARB_gpu_shader_int64"
 INT64_ATOMICS = "GL_NV_shader_atomic_int64"
 WINNERS = ("auto", "int64", "two-pass", "owned")  # ways to find them, all with the same result
 _FARTHEST = 0x7F800000  # +∞ as a float's bits
@@ -25,21 +26,25 @@ def choose_winners(device: Device, wanted: str, *, ownable: bool = True) -> str:
     """What a member of WINNERS comes to on a device: int64, two-pass or owned.
 
     auto: 64-bit atomics where there are some; else owned rows on software devices, where they take
-    0.4 to 0.6 of two passes' time (docs/performance.md); else two passes. ownable: points come in
-    rows that all views share. Raises UnsupportedError for 64-bit atomics where there are none.
+    a third of two passes' time (docs/performance.md); else two passes. ownable: points come in
+    rows that all views share. Raises UnsupportedError where the device lacks what it takes.
     """
     assert wanted in WINNERS
-    has_int64 = INT64_ATOMICS in device.info.extensions
-    if wanted == "int64" and not has_int64:
+    can = {
+        name: extension in device.info.extensions
+        for name, extension in (("int64", INT64_ATOMICS), ("owned", INT64))
+    }
+    if not can.get(wanted, True):
+        lacking = INT64_ATOMICS if wanted == "int64" else INT64
         raise UnsupportedError(
-            f"splat 'int64': {device.name} lacks {INT64_ATOMICS}; use two-pass, owned or auto, "
+            f"splat '{wanted}': {device.name} lacks {lacking}; use two-pass or auto, "
             "which give the same picture"
         )
     if wanted != "auto":
         return wanted
-    if has_int64:
+    if can["int64"]:
         return "int64"
-    return "owned" if device.info.software and ownable else "two-pass"
+    return "owned" if can["owned"] and device.info.software and ownable else "two-pass"
 
 
 class Winners(Protocol):
@@ -96,7 +101,7 @@ class SplitViewBuffers:
 
 
 class PackedViewBuffers:
-    """Depth above id in one 64-bit word: for one pass of 64-bit atomics."""
+    """Depth above id in one 64-bit word: for 64-bit atomics, and for owners of rows."""
 
     word_stride = 2
 
@@ -126,6 +131,6 @@ class PackedViewBuffers:
         self._forget.release()
 
 
-def make_view_buffers(device: Device, target: ViewTarget, *, int64: bool) -> ViewBuffers:
-    """The layout that 64-bit atomics, or their lack, ask for."""
-    return (PackedViewBuffers if int64 else SplitViewBuffers)(device, target)
+def make_view_buffers(device: Device, target: ViewTarget, winners: str) -> ViewBuffers:
+    """The layout for a way to find winners, of WINNERS but auto."""
+    return (SplitViewBuffers if winners == "two-pass" else PackedViewBuffers)(device, target)

@@ -18,7 +18,7 @@ from lfd_render.gpu.layout import dtype
 from lfd_render.gpu.memory import Buffer, TextureArray
 from lfd_render.gpu.scene_buffers import Batch
 
-BAND_BYTES = 96 << 20  # of one 32-bit word a view pixel; llvmpipe allows 128 MiB a buffer
+BAND_BYTES = 64 << 20  # of one 32-bit word a view pixel; two fit a buffer of llvmpipe, 128 MiB
 MOST_BAND_ROWS = 1000  # with at most 4 Mi triangles a batch, items stay below 2³²
 
 

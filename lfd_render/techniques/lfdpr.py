@@ -77,7 +77,7 @@ class Lfdpr:
                 device, scene, target, general=general, int64=int64, lod=lod, sampling=sampling
             )
         )
-        self._views = make_view_buffers(device, target, int64=int64)
+        self._views = make_view_buffers(device, target, self.winners)
         stride = self._views.word_stride
         self._shade = Shade(device, scene, target, stride, lod=lod, sampling=sampling)
         self._shared: SharedShade | None = None

@@ -103,12 +103,13 @@ vec4 sample_srgb(uint slot, Footprint f, int rule) {
         if (slot_group(slot) == group) size = vec2(textureSize(srgb_maps[group], 0).xy);
     Taps taps = taps_of(f, size, rule);
     vec4 sum = vec4(0.0);
-    for (int tap = 0; tap < taps.count; tap++) {
+    int tap = 0;
+    do {
         vec4 texel = vec4(1.0);
         for (int group = 0; group < SRGB_GROUPS; group++)
             if (slot_group(slot) == group) texel = textureLod(srgb_maps[group], tap_place(taps, tap, slot), tap == 0 ? taps.lods.x : taps.lods.y);
         sum += (tap == 0 ? taps.weights.x : taps.weights.y) * texel;
-    }
+    } while (++tap < taps.count);
     return sum;
 }
 
@@ -118,11 +119,12 @@ vec4 sample_linear(uint slot, Footprint f) {
         if (slot_group(slot) == group) size = vec2(textureSize(linear_maps[group], 0).xy);
     Taps taps = taps_of(f, size, LOD_RULE);
     vec4 sum = vec4(0.0);
-    for (int tap = 0; tap < taps.count; tap++) {
+    int tap = 0;
+    do {
         vec4 texel = vec4(1.0);
         for (int group = 0; group < LINEAR_GROUPS; group++)
             if (slot_group(slot) == group) texel = textureLod(linear_maps[group], tap_place(taps, tap, slot), tap == 0 ? taps.lods.x : taps.lods.y);
         sum += (tap == 0 ? taps.weights.x : taps.weights.y) * texel;
-    }
+    } while (++tap < taps.count);
     return sum;
 }

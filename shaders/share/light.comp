@@ -13,13 +13,13 @@ layout(local_size_x = BLOCK, local_size_y = GROUP_BLOCKS) in;
 #include "layout/Track"
 
 layout(std430) readonly restrict buffer Depths { float depths[]; };
-layout(std430) readonly restrict buffer Tracks { Track tracks[]; };
-layout(std430) readonly restrict buffer Cells { uvec4 cells[]; };
 layout(std430) readonly restrict buffer Eyes { float eyes[]; };
 layout(std430) readonly restrict buffer RowOffsets { float row_offsets[]; };
 
 layout(rgba16f, binding = 0) writeonly restrict uniform image2DArray view_images;
 
+uniform usamplerBuffer tracks;  // a texel a Track
+uniform usamplerBuffer cells;
 uniform mat4 turn_from_display;  // see Placement
 
 void main() {
@@ -30,14 +30,17 @@ void main() {
     words[index] = NO_TRIANGLE;  // so that no other batch takes the track for its own
     // Depth is the second word of a pixel that has both in one buffer.
     float k = frame.distance_mm / depths[index + WORD_STRIDE - 1u];
-    Track track = tracks[word & ~TRACK_WORD];
+    uvec4 texel = texelFetch(tracks, int(word & ~TRACK_WORD));
+    Track track = Track(texel.x, uintBitsToFloat(texel.y), uintBitsToFloat(texel.z), texel.w);
     float eye = eyes[pixel.z], column = float(pixel.x) + 0.5;
     float at = column + (eyes[track.view_steps & (1u << STEPS_SHIFT) - 1u] - eye) * (1.0 - k);  // the shear identity
     uint steps = track.view_steps >> STEPS_SHIFT;
     float along = clamp((at - track.from) * track.steps_per_column, 0.0, float(steps)), before = floor(along);
     uint first = track.first_cell, cell = min(uint(before), max(steps, 1u) - 1u), next = min(cell + 1u, steps);
-    vec3 previous = radiance_from(cells[first + max(cell, 1u) - 1u].xy), following = radiance_from(cells[first + min(cell + 2u, steps)].xy);
-    Matte matte = interpolated(previous, matte_from(cells[first + cell]), matte_from(cells[first + next]), following, along - float(cell));
+    vec3 previous = radiance_from(texelFetch(cells, int(first + max(cell, 1u) - 1u)).xy);
+    vec3 following = radiance_from(texelFetch(cells, int(first + min(cell + 2u, steps))).xy);
+    Matte here = matte_from(texelFetch(cells, int(first + cell))), there = matte_from(texelFetch(cells, int(first + next)));
+    Matte matte = interpolated(previous, here, there, following, along - float(cell));
 
     int row = frame.band_first + pixel.y;
     vec2 window = vec2((column - row_offsets[row]) * frame.column_mm, row_centre_mm(row));

@@ -4,6 +4,7 @@
 layout(local_size_x = VIEW_LANES) in;
 
 #include "splat/visit_count.glsl"
+#include "common/points.glsl"
 #include "splat/shear.glsl"
 
 void main() {

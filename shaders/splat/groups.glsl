@@ -2,6 +2,7 @@
 // where the index is the group's and no loop, branch or return has come before, twenty times as fast as
 // lane by lane; hence the order here.
 
+#include "common/points.glsl"
 #include "splat/shear.glsl"
 
 void main() {

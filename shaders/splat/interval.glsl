@@ -35,9 +35,11 @@ void splat_interval(PointRow points, Interval seen, int view, float eye) {
     float k_nearest = max(points.a_depth_k, points.b_depth_k), k_farthest = min(points.a_depth_k, points.b_depth_k);
     int row = row_of(points);
     uint line = view_pixel(row, view, 0), id = frame.triangle_base + points.triangle;
-    for (int column = seen.column; column < seen.end; column++) {
-        if (ALPHA_TESTED != 0 && !alpha_accepts(points.triangle, eye, row, column)) continue;
+    int column = seen.column;
+    do {
+        bool covered = column < seen.end;
+        if (ALPHA_TESTED != 0) covered = covered && alpha_accepts(points.triangle, eye, row, column);
         precise float k = points.a_depth_k + (float(column) + 0.5 - seen.a) * k_per_column;
-        visit(line + uint(column), frame.distance_mm / clamp(k, k_farthest, k_nearest), id);
-    }
+        if (covered) visit(line + uint(column), frame.distance_mm / clamp(k, k_farthest, k_nearest), id);
+    } while (++column < seen.end);
 }

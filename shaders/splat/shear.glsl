@@ -4,7 +4,7 @@
 // In: PointRows, Work, Eyes (columns); the batch where alpha counts. Out: what visit() writes.
 
 #include "common/triangles.glsl"
-#include "common/points.glsl"
+#include "common/slices.glsl"
 #include "common/alpha.glsl"
 #include "splat/interval.glsl"
 

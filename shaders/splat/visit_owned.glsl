@@ -1,14 +1,11 @@
-// The winner of a view pixel that no other invocation touches: nearest depth, then the smaller triangle,
-// compared and stored without atomics. The same winner as by atomics.
+// The winner of a view pixel that no other invocation touches: nearest depth, then the smaller triangle, in one
+// 64-bit word, depth above id, which a software device loads and stores at once. The same winner as by atomics.
 
-layout(std430) restrict buffer Depths { uint depths[]; };
-layout(std430) restrict buffer Words { uint words[]; };
+layout(std430) restrict buffer Winners { uint64_t winners[]; };
 
 void visit(uint pixel, float depth, uint id) {
-    uint bits = floatBitsToUint(depth), nearest = depths[pixel];  // positive floats order as their bits
-    if (bits > nearest || (bits == nearest && id >= words[pixel])) return;
-    depths[pixel] = bits;
-    words[pixel] = id;
+    uint64_t word = packUint2x32(uvec2(id, floatBitsToUint(depth)));  // positive floats order as their bits
+    if (word < winners[pixel]) winners[pixel] = word;
 }
 
 void tried(uint pixels) {}  // counted by splat/visit_count.glsl

@@ -290,7 +290,7 @@ class Passes:
             self.splat = Splat(
                 *common, general=general, int64=self.int64, lod=lod, sampling=sampling
             )
-        self.views = make_view_buffers(device, self.target, int64=self.int64)
+        self.views = make_view_buffers(device, self.target, chosen)
         self.shade = Shade(*common, self.views.word_stride, lod=lod, sampling=sampling)
         self.points = [self.sample.allocate(batch) for batch in self.buffers.batches]
         self.buffers.pose(pose)
@@ -401,7 +401,7 @@ class Passes:
         """Words and depths of a band, [row, view, column]."""
         shape = (band.rows, self.rig.views, self.grid.columns)
         count = int(np.prod(shape))
-        if self.int64:
+        if self.views.word_stride == 2:
             pairs = self.views.words.read(np.uint32, 2 * count).reshape(*shape, 2)
             words, bits = pairs[..., 0], pairs[..., 1]  # depth above id
         else:

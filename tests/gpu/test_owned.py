@@ -19,11 +19,11 @@ from lfd_render.gpu.device import Device
 from lfd_render.gpu.layout import dtype
 from lfd_render.gpu.scene_buffers import SceneBuffers
 from lfd_render.passes import bin as bin_pass
-from lfd_render.passes import owned
+from lfd_render.passes import owned, view_target
 from lfd_render.passes.bin import Bin
 from lfd_render.passes.placement import Placement
 from lfd_render.passes.sample import Sample
-from lfd_render.passes.view_buffers import INT64_ATOMICS, choose_winners
+from lfd_render.passes.view_buffers import INT64, INT64_ATOMICS, choose_winners
 from lfd_render.passes.view_target import ViewTarget
 from lfd_render.renderer import Renderer
 from lfd_render.scene import Material, Scene
@@ -176,6 +176,10 @@ def test_pictures_are_the_same(device: Device) -> None:
     np.testing.assert_array_equal(found["owned"], found["two-pass"])
 
 
+def test_the_largest_band_fits_a_buffer(device: Device) -> None:
+    assert 2 * view_target.BAND_BYTES <= device.info.max_storage_bytes
+
+
 @pytest.mark.parametrize("count", [1, 2, 3, 8, 360, 361, 1000])
 def test_strides_visit_every_row(count: int) -> None:
     visited = np.arange(count) * owned.coprime_stride(count) % count
@@ -183,20 +187,27 @@ def test_strides_visit_every_row(count: int) -> None:
 
 
 def test_what_suits_the_device_is_chosen(device: Device) -> None:
-    for int64 in (False, True):
+    for extensions in ((), (INT64,), (INT64, INT64_ATOMICS)):
         for software in (False, True):
             info = dataclasses.replace(
-                device.info,
-                software=software,
-                extensions=frozenset({INT64_ATOMICS} if int64 else ()),
+                device.info, software=software, extensions=frozenset(extensions)
             )
             other = SimpleNamespace(info=info, name="other")
-            expected = "int64" if int64 else "owned" if software else "two-pass"
+            owned_ones = software and INT64 in extensions
+            expected = (
+                "int64" if INT64_ATOMICS in extensions else "owned" if owned_ones else "two-pass"
+            )
             assert choose_winners(other, "auto") == expected
             assert choose_winners(other, "auto", ownable=False) == expected.replace(
                 "owned", "two-pass"
             )
             assert choose_winners(other, "two-pass") == "two-pass"
+
+
+def test_a_device_without_64_bit_words_says_so(device: Device) -> None:
+    info = dataclasses.replace(device.info, extensions=frozenset())
+    with pytest.raises(GpuError, match=f"owned': other lacks {INT64}; use two-pass"):
+        choose_winners(SimpleNamespace(info=info, name="other"), "owned")
 
 
 def test_a_device_without_64_bit_atomics_says_so(device: Device) -> None:
