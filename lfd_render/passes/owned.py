@@ -6,7 +6,7 @@ import math
 
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.layout import lod_constants
-from lfd_render.gpu.programs import Kernel
+from lfd_render.gpu.programs import Kernel, Samplers
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.bin import Bin
 from lfd_render.passes.sample import PointCloud
@@ -98,7 +98,7 @@ class OwnedSplat:
             "Eyes": band.target.eyes,
             "RowOffsets": band.target.row_offsets,
         }
-        samplers = {**self._scene.samplers(), "binned_rows": self._bin.rows}
+        samplers: Samplers = {**self._scene.samplers(), "binned_rows": self._bin.rows}
         groups = band.rows, self._view_blocks, 1
         stride = coprime_stride(band.rows)
         for taken in range(0, self._bin.room(batch), self._bin_items[tested]):
