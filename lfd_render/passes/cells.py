@@ -145,11 +145,12 @@ class CellSource(ABC):
         return short
 
     def count(self, batch: Batch, points: CellCloud, band: Band) -> int:
-        """Points of one batch and band. Samples, counts and waits: not for a frame."""
+        """Points of a batch and band that was sampled last, and filled if it is one window. Counts
+        and waits: not for a frame."""
         total = 0
-        self(batch, points, band)
         for window in range(points.windows):
-            self.fill(batch, points, band, window)
+            if points.windows > 1:
+                self.fill(batch, points, band, window)
             total += int(points.work.read(dtype("CellWork"))["points"][0])
         return total
 

@@ -145,11 +145,12 @@ class Sample:
         self._rows.run_indirect(points.work, window * dtype("Work").itemsize + ROWS_DISPATCH)
 
     def count(self, batch: Batch, points: PointCloud, band: Band) -> int:
-        """Points of one batch and band. Samples, counts and waits: not for a frame."""
+        """Points of a batch and band that was sampled last, and filled if it is one window. Counts
+        and waits: not for a frame."""
         self._total.fill(0)
-        self(batch, points, band)
         for window in range(points.windows):
-            self.fill(batch, points, band, window)
+            if points.windows > 1:
+                self.fill(batch, points, band, window)
             self._count.set(
                 {
                     **batch.geometry(),

@@ -106,7 +106,8 @@ class PointSource(Protocol):
         ...
 
     def count(self, batch: Batch, points: Any, band: Band) -> int:
-        """Points of one batch and band, counted outside a frame."""
+        """Points of a batch and band that was sampled last, and filled if it is one window;
+        counted outside a frame."""
         ...
 
     def release(self) -> None:

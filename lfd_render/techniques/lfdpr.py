@@ -84,6 +84,7 @@ class Lfdpr:
         if sampling.shade == "shared" and target.rig.views > 1:
             self._shared = SharedShade(device, scene, target, stride, lod=lod, sampling=sampling)
         self._points: list[Points] = [self._source.allocate(batch) for batch in scene.batches]
+        self._sampled: Band | None = None  # what the points are of, at the last placement
         self._make_counter = partial(
             CountPairs, device, scene, target, sampling, general=general, lod=lod
         )
@@ -91,6 +92,7 @@ class Lfdpr:
     def begin(self, placement: Placement, clock: StageClock) -> None:
         """Place the scene and transform its vertices."""
         self._placement = placement
+        self._sampled = None
         with clock.stage("transform"):
             self._scene.place(placement.display_from_world)
             for batch in self._scene.batches:
@@ -117,10 +119,7 @@ class Lfdpr:
     def render(self, band: Band, clock: StageClock) -> None:
         """Sample, splat and shade one band of rows."""
         with clock.stage("sample"):
-            for batch, points in self._batches():
-                self._source(batch, points, band)
-                if points.windows == 1:
-                    self._source.fill(batch, points, band, 0)
+            self._sample(band)
         solid = [pair for pair in self._batches() if pair[0].alpha_mode != "blend"]
         with clock.stage("splat"):
             self._views.clear()
@@ -133,6 +132,13 @@ class Lfdpr:
                 self._views.clear_words()
                 self._find_winners(blended, band)
                 self._shade.blend(blended, band, self._views, self._placement)
+
+    def _sample(self, band: Band) -> None:
+        for batch, points in self._batches():
+            self._source(batch, points, band)
+            if points.windows == 1:
+                self._source.fill(batch, points, band, 0)
+        self._sampled = band
 
     def _find_winners(self, batches: list[tuple[Batch, Points]], band: Band) -> None:
         for step in self._splat.steps:
@@ -150,12 +156,14 @@ class Lfdpr:
         return not any(enlarged)
 
     def count_points(self) -> int:
-        """Points of all bands at the last placement. Samples again, outside any timing."""
-        return sum(
-            self._source.count(batch, points, band)
-            for band in self.target.bands
-            for batch, points in self._batches()
-        )
+        """Points of all bands at the last placement, outside any timing. Samples again where there
+        are several bands."""
+        total = 0
+        for band in self.target.bands:
+            if band is not self._sampled:
+                self._sample(band)
+            total += sum(self._source.count(*pair, band) for pair in self._batches())
+        return total
 
     def effort(self) -> Effort:
         """What a frame at the last placement takes. Samples and splats again, outside any
@@ -163,10 +171,11 @@ class Lfdpr:
         counter = self._make_counter()
         tried = kept = visible = 0
         for band in self.target.bands:
+            self._sample(band)
             for batch, points in self._batches():
-                self._source(batch, points, band)
                 for window in range(points.windows):
-                    self._source.fill(batch, points, band, window)
+                    if points.windows > 1:
+                        self._source.fill(batch, points, band, window)
                     pairs = counter(batch, points, band, window)
                     tried, kept = tried + pairs[0], kept + pairs[1]
             self._views.clear()

@@ -358,11 +358,13 @@ class Passes:
 
     def count_points(self) -> int:
         """Points of all batches and bands, counted by the device."""
-        return sum(
-            self.sample.count(batch, points, band)
-            for band in self.target.bands
-            for batch, points in self.batches
-        )
+        total = 0
+        for band in self.target.bands:
+            for batch, points in self.batches:
+                self.sample(batch, points, band)
+                self.sample.fill(batch, points, band, 0)
+                total += self.sample.count(batch, points, band)
+        return total
 
     def winners(self) -> Winners:
         """Splat all bands."""

@@ -17,7 +17,10 @@ from lfd_render.errors import ResourceError, SceneError, UsageError
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
+from lfd_render.gpu.scene_buffers import Batch
+from lfd_render.passes.sample import PointCloud, Sample
 from lfd_render.passes.transform import Transform
+from lfd_render.passes.view_target import Band
 from lfd_render.renderer import Renderer
 from lfd_render.scene import Pose, Scene, node_transform
 
@@ -286,3 +289,24 @@ def test_arguments_of_the_wrong_kind(device: Device, display: DisplayProfile) ->
         with pytest.raises(UsageError, match="camera: 3; give a Camera"):
             stage.frame(3)  # type: ignore[arg-type]
     renderer.close()
+
+
+def test_points_are_counted_where_they_lie(
+    device: Device, display: DisplayProfile, camera: Camera, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sampled = []
+    original = Sample.__call__
+
+    def sample(self: Sample, batch: Batch, points: PointCloud, band: Band) -> None:
+        sampled.append(band)
+        original(self, batch, points, band)
+
+    with Renderer(device) as renderer, renderer.stage(reed(), display, camera) as stage:
+        stage.render()
+        monkeypatch.setattr(Sample, "__call__", sample)
+        moved = stage.render(camera.turned(0.1)).report["points"]
+        assert len(sampled) == len(stage._buffers.batches)
+        again = stage._frames.technique
+        again._sampled = None  # control: what is not at hand is sampled anew
+        assert again.count_points() == moved > 0
+        assert len(sampled) == 2 * len(stage._buffers.batches)
