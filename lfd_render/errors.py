@@ -24,6 +24,11 @@ class OptionError(UsageError):
         return f"{self.option}: {self.reason}"
 
 
+class SizeError(OptionError):
+    """A picture is larger than its format holds, or than the server makes. option: what makes it
+    so."""
+
+
 class SceneError(LfdError):
     """A scene, texture or camera cannot be read or makes no sense."""
 
@@ -91,6 +96,7 @@ EXIT_INTERRUPTED = 130
 
 HTTP_STATUSES: dict[type[LfdError], int] = {
     UsageError: 400,
+    SizeError: 422,
     SceneError: 422,
     ProfileError: 422,
     GpuError: 503,

@@ -12,8 +12,9 @@ from lfd_render.display.calibration.by_eye import FIELDS, adjusted, finished
 from lfd_render.display.patterns import PATTERNS
 from lfd_render.engine.jobs import Job, Pattern
 from lfd_render.engine.patterns import PATTERN_COLOURS, check_pattern
+from lfd_render.engine.plans import check_picture
 from lfd_render.engine.texts import parse_size
-from lfd_render.errors import ProfileError, ResourceError
+from lfd_render.errors import ProfileError
 from lfd_render.panel.eyes import stands
 
 from .answers import answer
@@ -113,13 +114,11 @@ async def _answer(
     through: Display | None,
 ) -> Response:
     profile = state.displays.told(display)
-    width, height = profile.resolution_px
-    if width * height > state.settings.max_view_pixels:
-        most = state.settings.max_view_pixels
-        raise ResourceError(f"display: {width} × {height} pixels; the limit is {most} together")
     media = choose(request.headers.get("accept"), PICTURES)
     seen = None if through is None else state.displays.told(through)
-    return await answer(request, state, fields.job(media, profile, seen))
+    job = fields.job(media, profile, seen)
+    check_picture(job, state.settings.max_picture_pixels)
+    return await answer(request, state, job)
 
 
 @router.get(

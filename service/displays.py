@@ -15,6 +15,7 @@ from lfd_render.display.convert import convert
 from lfd_render.engine import encoding
 from lfd_render.engine.choices import Choices
 from lfd_render.engine.jobs import Job, ViewMap
+from lfd_render.engine.plans import check_picture
 
 from .answers import answer
 from .display_store import is_shipped
@@ -202,4 +203,5 @@ async def view_map(
         request.headers.get("accept"), [encoding.NPY] if many else [encoding.PNG, encoding.NPY]
     )
     job = Job(ViewMap(), media, None, display, Choices(views=query.views))
+    check_picture(job, state.settings.max_picture_pixels)
     return await answer(request, state, job)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from lfd_render.display import Camera, DisplayProfile
 from lfd_render.engine import encoding
 from lfd_render.engine.jobs import AllViews, Job, PanelImage, SceneSource
-from lfd_render.engine.plans import check_plan
+from lfd_render.engine.plans import check_picture, check_plan
 
 from .fields import AnyBody, AnyQuery, EiaFields, Views
 from .media import choose
@@ -58,6 +58,7 @@ def _job(
     job = Job(fields.product, media, source, display, fields.choices(camera))
     settings = state.settings
     check_plan(job, settings.max_job_view_pixels if later else settings.max_view_pixels)
+    check_picture(job, settings.max_picture_pixels)
     return job
 
 

@@ -77,6 +77,9 @@ class Settings(BaseModel):
     max_view_pixels: Whole = Field(
         1 << 28, description="Pixels of all views of a picture together, times samples a pixel."
     )
+    max_picture_pixels: Whole = Field(
+        1 << 26, description="Pixels of one encoded picture, of each view in an archive."
+    )
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         "info", description="Least level that is logged: debug, info, warning or error."
     )

@@ -138,7 +138,7 @@ def animate(
     from lfd_render.engine.engines import open_engine  # noqa: PLC0415
     from lfd_render.engine.frame_store import frame_store  # noqa: PLC0415
     from lfd_render.engine.motion import Motion  # noqa: PLC0415
-    from lfd_render.engine.plans import check_plan  # noqa: PLC0415
+    from lfd_render.engine.plans import check_picture, check_plan  # noqa: PLC0415
     from lfd_render.engine.sequence import Sequence, parse_frames  # noqa: PLC0415
 
     chosen = parse_frames(frames)
@@ -153,7 +153,9 @@ def animate(
         encoding.PNG if format == FrameFormat.PNG else encoding.EXR,
         choices,
     )
-    check_plan(sequence.job(chosen[0]), sys.maxsize)
+    job = sequence.job(chosen[0])
+    check_plan(job, sys.maxsize)
+    check_picture(job, sys.maxsize)
     watch = Stopwatch()
     with ExitStack() as stack:
         store = stack.enter_context(frame_store(output, resume))

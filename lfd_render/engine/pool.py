@@ -15,6 +15,7 @@ from typing import Any
 import lfd_render.errors
 from lfd_render.engine.jobs import Cancel, Done, Failed, Forget, Job, NotReady, Ready, Result, Work
 from lfd_render.engine.jobs import Progress as Told
+from lfd_render.engine.plans import encoding_seconds
 from lfd_render.engine.process import RenderProcess
 from lfd_render.engine.worker import WorkerConfig
 from lfd_render.errors import (
@@ -30,7 +31,8 @@ from lfd_render.errors import (
 _log = logging.getLogger(__name__)
 
 _WATCH_S = 0.1
-_MOST_DEATHS = 2  # of processes at a scene, before it is refused
+_MOST_DEATHS = 2  # of processes at a scene or an order, before it is refused
+_REFUSED_S = 3600.0  # how long a death counts
 _MOST_KILLS = 4  # of processes at a job by others, before it is given up
 _PATIENCE_S = 1.0  # how long the first in the queue lets others go where their scene is warm
 _QUIET_S = 2.0  # nobody asks for so long before the only process turns to the background
@@ -76,8 +78,9 @@ class Pool:
     """Render processes, each with one context for life, and the jobs that wait for them.
 
     A job goes to the process that has most of what it needs. It is done again when its process
-    dies; a scene at which processes die twice is refused from then on. Jobs in the background leave
-    one process to the others; where there is but one, they give way, and are begun again in a lull.
+    dies. A scene at which processes die twice is refused for an hour; where we end them, since they
+    hang or grow too large, that order alone is. Jobs in the background leave one process to the
+    others; where there is but one, they give way, and are begun again in a lull.
     """
 
     def __init__(self, settings: PoolSettings) -> None:
@@ -85,7 +88,7 @@ class Pool:
         self.counts: Counter[str] = Counter()  # jobs by outcome, and restarts
         self._busy: dict[RenderProcess, _Ticket | None] = {}
         self._waiting: list[_Ticket] = []
-        self._deaths: Counter[str] = Counter()  # by scene
+        self._deaths: dict[str, list[float]] = {}  # when, by a scene's id or an order's key
         self._number = 0
         self._failed_starts = 0
         self._trouble = ""
@@ -222,17 +225,19 @@ class Pool:
 
     @property
     def blocked(self) -> list[str]:
-        """Scenes that are refused."""
-        return [scene for scene, deaths in self._deaths.items() if deaths >= _MOST_DEATHS]
+        """Scenes and orders that are refused."""
+        return [blamed for blamed in self._deaths if self._died(blamed) >= _MOST_DEATHS]
 
     def _check(self, job: Job, background: bool) -> None:
         if self._draining:
             raise UnavailableError("the server is going down; ask again")
-        if job.scene and self._deaths[job.scene.id] >= _MOST_DEATHS:
-            raise PoisonError(
-                f"{job.scene.name}: ended {_MOST_DEATHS} render processes and is refused; "
-                "give another scene"
-            )
+        if job.scene and self._deaths:
+            for blamed, remedy in ((job.scene.id, "another scene"), (job.key, "other options")):
+                if self._died(blamed) >= _MOST_DEATHS:
+                    raise PoisonError(
+                        f"{job.scene.name}: ended {_MOST_DEATHS} render processes and is refused; "
+                        f"give {remedy}"
+                    )
         waiting = sum(not ticket.background for ticket in self._waiting)
         if waiting >= self.settings.queue and not background:
             self.counts["refused"] += 1
@@ -375,14 +380,17 @@ class Pool:
         """Decide what becomes of a dead process's job."""
         scene = ticket.job.scene
         ticket.kills += 1
-        # SIGKILL that is not ours says nothing about the scene, until it happens again and again.
-        innocent = process.returncode == -signal.SIGKILL and not process.condemned
-        if scene and not innocent:
-            self._deaths[scene.id] += 1
+        # SIGKILL comes from us or for want of memory, maybe by the fault of the order; what is not
+        # ours says nothing until it happens again and again. All else is the scene's fault.
+        killed = process.returncode == -signal.SIGKILL
+        blamed = ticket.job.key if killed or scene is None else scene.id
+        if process.condemned or not killed:
+            self._deaths.setdefault(blamed, []).append(time.monotonic())
+        elif ticket.kills >= _MOST_KILLS:
+            self._deaths[blamed] = [time.monotonic()] * _MOST_DEATHS
         if scene is None and ticket.kills >= _MOST_DEATHS:
             self._fail(ticket, InternalError(f"{ticket.kills} processes ended over it"))
-        elif scene and (self._deaths[scene.id] >= _MOST_DEATHS or ticket.kills >= _MOST_KILLS):
-            self._deaths[scene.id] = max(self._deaths[scene.id], _MOST_DEATHS)
+        elif scene and self._died(blamed) >= _MOST_DEATHS:
             self._fail(
                 ticket,
                 PoisonError(f"{scene.name}: rendering it ends the process; give another scene"),
@@ -391,6 +399,11 @@ class Pool:
             ticket.yields = False
             self._waiting.insert(0, ticket)
             self._dispatch()
+
+    def _died(self, blamed: str) -> int:
+        """How many processes died of it lately."""
+        since = time.monotonic() - _REFUSED_S
+        return sum(when > since for when in self._deaths.get(blamed, ()))
 
     def _fail(self, ticket: _Ticket, error: Exception) -> None:
         if not ticket.answer.done():
@@ -415,9 +428,7 @@ class Pool:
             self._dispatch()  # what waited for a lull
             now = time.monotonic()
             for process, ticket in self._busy.items():
-                # A job that waited long, or for an impatient client, has its time none the less.
-                allowed = ticket and max(ticket.deadline, ticket.started + self.settings.deadline_s)
-                late = allowed and now > allowed + self.settings.grace_s
+                late = ticket is not None and self._hangs(ticket, now)
                 large = limit and process.resident_bytes() > limit
                 if (late or large) and not process.condemned:
                     _log.warning(
@@ -425,6 +436,13 @@ class Pool:
                         extra={"pid": process.pid, "why": "hangs" if late else "too large"},
                     )
                     process.condemn()
+
+    def _hangs(self, ticket: _Ticket, now: float) -> bool:
+        # A job that waited long, or for an impatient client, has its time none the less.
+        most = max(ticket.deadline, ticket.started + self.settings.deadline_s)
+        late_s = now - most - self.settings.grace_s
+        # An encoder says nothing while it works.
+        return late_s > 0 and late_s > encoding_seconds(ticket.job)
 
     async def _change(self) -> None:
         """Wait until something has changed."""

@@ -136,6 +136,7 @@ class Workshop:
 
     def _panel_image(self, job: Job, progress: Progress, spans: Spans) -> Result:
         eia = self._eia(job, progress, spans)
+        progress(1.0)
         mount = _display(job).panel.mount
         with spans.span("encode"):
             if job.media == encoding.EXR:
@@ -162,6 +163,7 @@ class Workshop:
                     )
                     for eye in eyes
                 ]  # fmt: skip
+        progress(1.0)
         picture = side_by_side(pictures)
         with spans.span("encode"):
             body = encoding.encoded(picture, job.media)
@@ -199,6 +201,7 @@ class Workshop:
             rig = Rig.of(display, count, choices.spacing).only(view.index)
         size = choices.view_size or upright_size(display, count)
         picture = self._views(job, progress, spans, rig, view_size=size)[0]
+        progress(1.0)
         with spans.span("encode"):
             body = encoding.encoded(picture, job.media, _text(job))
         return _result(job, body, picture, self._report(job), spans)
@@ -206,20 +209,21 @@ class Workshop:
     def _all_views(self, job: Job, progress: Progress, spans: Spans) -> Result:
         pictures = self._views(job, progress, spans)
         text = _text(job) | {"lfd:views": str(len(pictures))}
+
+        def file(index: int) -> tuple[str, bytes]:
+            progress(1.0)
+            told = text | {"lfd:view": str(index)}
+            return f"view_{index:03d}.png", encoding.encoded(pictures[index], encoding.PNG, told)
+
         with spans.span("encode"):
-            body = encoding.zipped(
-                (
-                    f"view_{index:03d}.png",
-                    encoding.encoded(picture, encoding.PNG, text | {"lfd:view": str(index)}),
-                )
-                for index, picture in enumerate(pictures)
-            )
+            body = encoding.zipped(map(file, range(len(pictures))))
         return _result(job, body, pictures[0], self._report(job), spans)
 
     def _quilt(self, job: Job, asked: QuiltPicture, progress: Progress, spans: Spans) -> Result:
         display = _display(job)
         size = chosen_size(display, asked.device, asked.tiles, asked.size)
         views = self._views(job, progress, spans, views=size.views, view_size=size.view_px)
+        progress(1.0)
         aspect = display.size_mm[0] / display.size_mm[1]
         pixels = (size.width_px, size.height_px)
         quilt = Quilt(views, size.columns, size.rows, aspect, pixels, _text(job))

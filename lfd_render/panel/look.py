@@ -69,6 +69,12 @@ def look(
     return look_from(eia, profile, eye, views, size_px, sigma_views=sigma_views, optics=optics)
 
 
+def seen_size(profile: DisplayProfile, views: int) -> tuple[int, int]:
+    """Width and height of an eye's picture: as many rows as so many views have, square pixels."""
+    rows = ViewGrid.default_rows(profile, views)
+    return max(1, round(rows * profile.size_mm[0] / profile.size_mm[1])), rows
+
+
 def look_from(
     eia: Pixels,
     profile: DisplayProfile,
@@ -102,7 +108,7 @@ def look_from(
     if not 1 <= count <= MAX_VIEWS:
         raise UsageError(f"views is {count}; it should be from 1 to {MAX_VIEWS}")
     grid = ViewGrid.lens(profile, ViewGrid.default_rows(profile, count))
-    columns = max(1, round(grid.rows * profile.size_mm[0] / profile.size_mm[1]))
+    columns, _ = seen_size(profile, count)
     out_columns, out_rows = size_px or (columns, grid.rows)
     if min(out_columns, out_rows) < 1:
         raise UsageError(f"view size is {out_columns} x {out_rows}; it should be at least 1 x 1")

@@ -15,7 +15,7 @@ import httpx
 import pytest
 
 from .conftest import GLTF, PATH, PROFILE, Server, Start
-from .faults.sitecustomize import BREAK, CRASH, EAT, HANG, LOSE, SLOW, SWELL
+from .faults.sitecustomize import BREAK, CRASH, EAT, HANG, LOSE, MUTE, SLOW, SWELL
 
 pytestmark = pytest.mark.needs("gl")
 FAULTS = Path(__file__).parent / "faults"
@@ -132,6 +132,31 @@ def test_a_scene_that_hangs_meets_its_deadline(client: httpx.Client) -> None:
     # It is ended when it has had the time of any picture, and another takes its place.
     until(lambda: metric(client, "lfd_process_restarts_total") == before + 1)
     until(lambda: client.get("/readyz").json()["processes_ready"] == 2)
+
+
+def test_what_one_order_does_to_a_scene_is_not_the_others_fault(start: Start) -> None:
+    """An order whose process hangs twice is refused, another of the same scene is not; and an
+    encoder has the time that its picture takes, though it says nothing meanwhile."""
+    settings = {"deadline_s": 1, "grace_s": 0.2, "python_path": FAULTS}
+    with start("--processes", "1", **settings) as server, server.client() as client:
+        client.put("/v1/displays/small", json=PROFILE).raise_for_status()
+        restarts = "lfd_process_restarts_total"
+
+        def ready() -> bool:
+            told = client.get("/readyz").json()
+            return bool(told["processes_ready"] == 1 and told["running"] == 0)
+
+        large = {"display": "small", "size": "4000x3000", "seed": MUTE}  # 6 s of WebP
+        problem(client.get(f"{PATH}/look", params=large, headers={"Accept": "image/webp"}), 504)
+        until(ready)
+        assert metric(client, restarts) == 0
+        for count in (1, 2):
+            problem(eia(client, seed=HANG), 504)
+            until(lambda: metric(client, restarts) == count)  # noqa: B023
+            until(ready)
+        assert "other options" in problem(eia(client, seed=HANG), 422)["detail"]
+        assert client.get(f"{PATH}/eia?display=small&seed=3").status_code in (200, 504)
+        assert metric(client, restarts) == 2
 
 
 def test_a_scene_that_eats_memory_is_told_so(client: httpx.Client) -> None:

@@ -22,15 +22,18 @@ from .conftest import GLTF, PATH, PROFILE, Server, Start
 
 pytestmark = pytest.mark.needs("gl")
 KEY = "a key of the tests"
+WIDE = PROFILE | {"panel": PROFILE["panel"] | {"resolution_px": [4096, 4096]}}
 
 
 @pytest.fixture(scope="module")
 def server(start: Start) -> Iterator[Server]:
     """One with small limits, without keys."""
     limits = {"max_upload_mb": 2, "max_texels": 1 << 20, "max_triangles": 5000}
-    with start(max_view_pixels=1 << 24, max_scenes=3, **limits) as server:
+    pixels = {"max_view_pixels": 1 << 24, "max_picture_pixels": 1 << 23}
+    with start(max_scenes=3, **limits, **pixels) as server:
         with server.client() as client:
             client.put("/v1/displays/small", json=PROFILE).raise_for_status()
+            client.put("/v1/displays/wide", json=WIDE).raise_for_status()
         yield server
 
 
@@ -72,10 +75,40 @@ def problem(response: httpx.Response, status: int) -> dict[str, Any]:
         ("camera=nobody", 422, "camera"),
         ("views=1024&view_size=9000x9000", 413, "views"),
         ("display=small&supersample=16x16", 413, "views"),
+        ("display=wide", 422, "display"),
     ],
 )
 def test_queries_are_checked(client: httpx.Client, query: str, status: int, field: str) -> None:
     assert problem(client.get(f"{PATH}/eia?{query}"), status).get("field") == field
+
+
+@pytest.mark.parametrize(
+    ("query", "media", "field", "remedy"),
+    [
+        ("view?view_size=3000x3000", "image/png", "view_size", "limit is 8388608"),
+        ("views?view_size=3000x3000&views=1", "application/zip", "view_size", "limit is 8388608"),
+        ("quilt?tiles=1x1&size=3000x3000", "image/png", "size", "limit is 8388608"),
+        ("quilt?tiles=1x1&size=20000x1", "image/webp", "size", "16383 pixels a side"),
+        ("look?sweep=-9:9:300&size=60x60", "image/webp", "sweep", "16383 pixels a side"),
+        ("look?sweep=-9:9:400&size=300x1", "image/jpeg", "sweep", "65500 pixels a side"),
+        ("look?display=wide", "image/png", "display", "limit is 8388608"),
+    ],
+)
+def test_pictures_are_bounded(
+    client: httpx.Client, query: str, media: str, field: str, remedy: str
+) -> None:
+    """Before they are queued; what one encoding takes is all that nobody can call off."""
+    place, _, options = query.partition("?")
+    query = options if "display" in options else f"display=small&{options}"
+    found = client.get(f"{PATH}/{place}?{query}", headers={"Accept": media})
+    told = problem(found, 422)
+    assert told["field"] == field
+    assert remedy in told["detail"]
+
+
+@pytest.mark.parametrize("what", ["map", "pattern"])
+def test_panels_are_bounded(client: httpx.Client, what: str) -> None:
+    assert problem(client.get(f"/v1/displays/wide/{what}"), 422)["field"] == "display"
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import signal
 import sys
 import time
 
-CRASH, HANG, EAT, SLOW, BREAK, SWELL, LOSE = range(900, 907)
+CRASH, HANG, EAT, SLOW, BREAK, SWELL, LOSE, MUTE = range(900, 908)
 SLOW_S = 1.0
 SWELL_BYTES = 1 << 30
 
@@ -14,6 +14,7 @@ if "lfd_render.engine.worker" in sys.orig_argv:
     import numpy as np
 
     from lfd_render.engine import workshop
+    from lfd_render.engine.jobs import Result
     from lfd_render.errors import GpuError
 
     whole = workshop.Workshop.make
@@ -24,6 +25,9 @@ if "lfd_render.engine.worker" in sys.orig_argv:
             os.kill(os.getpid(), signal.SIGSEGV)
         elif seed == HANG:
             time.sleep(1000)
+        elif seed == MUTE:  # as an encoder is while it works
+            time.sleep(4)
+            return Result(b"picture", job.media, {"size": [1, 1]})
         elif seed == EAT:
             self.eaten = [np.empty(1 << 28, np.uint8) for _ in range(1 << 8)]
         elif seed == SWELL:  # where no limit on allocation reaches
