@@ -55,6 +55,7 @@ class DeviceInfo:
     max_texture_units: int
     max_array_layers: int
     max_texture_size: int
+    max_buffer_texels: int
     max_groups: int
     max_storage_blocks: int  # of a compute shader
     geometry_storage: bool  # whether the geometry stage has storage blocks to speak of
@@ -180,6 +181,7 @@ def _describe(context: moderngl.Context, raw: RawGl, egl_index: int) -> DeviceIn
         max_storage_bytes=int(info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"]),
         max_texture_units=int(info["GL_MAX_TEXTURE_IMAGE_UNITS"]),
         max_array_layers=int(info["GL_MAX_ARRAY_TEXTURE_LAYERS"]),
+        max_buffer_texels=int(info["GL_MAX_TEXTURE_BUFFER_SIZE"]),
         max_texture_size=int(info["GL_MAX_TEXTURE_SIZE"]),
         max_groups=int(info["GL_MAX_COMPUTE_WORK_GROUP_COUNT"][0]),
         max_storage_blocks=raw.integer(MAX_COMPUTE_SHADER_STORAGE_BLOCKS),

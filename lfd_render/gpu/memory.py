@@ -134,8 +134,15 @@ class Buffer(Owned):
 
     def bind(self, unit: int) -> None:
         """Make the buffer what samplers of this unit read, four 32-bit words a texel: software
-        devices gather from it faster than from storage blocks."""
-        raw = self._device.raw
+        devices gather from it faster than from storage blocks. Raises ResourceError for more texels
+        than samplers reach."""
+        raw, info = self._device.raw, self._device.info
+        if self.size > 16 * info.max_buffer_texels:
+            raise ResourceError(
+                f"device buffer '{self.label}': {self.size} bytes exceed the "
+                f"{16 * info.max_buffer_texels} that samplers of {self._device.name} reach; use "
+                "fewer or smaller views, or a smaller scene"
+            )
         if not self._texture:
             name = ctypes.c_uint()
             raw.glCreateTextures(gl.TEXTURE_BUFFER, 1, ctypes.byref(name))

@@ -1,5 +1,6 @@
 """The device and what lives on it: choice, names, memory, errors, clocks, shader messages."""
 
+import dataclasses
 import time
 from pathlib import Path
 
@@ -154,6 +155,19 @@ def test_too_large_is_refused_by_name(device: Device) -> None:
         Buffer(device, "enormous", device.info.max_storage_bytes + 4)
     with pytest.raises(ResourceError, match="enormous"):
         TextureArray(device, "enormous", (device.info.max_texture_size + 1, 1, 1), gl.RGBA8)
+
+
+def test_buffers_that_samplers_do_not_reach_are_refused(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What lies behind the last texel would be read as zeros, and no driver says so."""
+    buffer = Buffer(device, "points", 1024)
+    monkeypatch.setattr(device, "info", dataclasses.replace(device.info, max_buffer_texels=64))
+    buffer.bind(0)
+    monkeypatch.setattr(device, "info", dataclasses.replace(device.info, max_buffer_texels=63))
+    with pytest.raises(ResourceError, match=r"'points': 1024 bytes exceed the 1008"):
+        buffer.bind(0)
+    buffer.release()
 
 
 def test_gl_errors_are_raised(device: Device) -> None:
