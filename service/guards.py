@@ -20,6 +20,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from .clients import ClientGoneError
 from .page import is_page
 from .problems import ProblemError, problem
+from .scene_store import FORM_BYTES
 from .settings import Settings
 
 PROBES = ("/livez", "/readyz")
@@ -28,7 +29,6 @@ _ANY = ("0.0.0.0", "::")
 _MOST_BUCKETS = 10_000
 _BODY_BYTES = 4 << 20  # of anything but a scene
 _LEAST_BYTES_A_S = 1 << 14  # of a body, on the whole
-_MULTIPART_BYTES = 1 << 20  # what headers of parts may take besides the files
 
 
 async def refuse(scope: Scope, receive: Receive, send: Send, error: ProblemError) -> None:
@@ -156,7 +156,7 @@ class Bodies:
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self._app = app
         self._idle_s = settings.idle_s
-        self._scene_bytes = settings.upload_bytes + _MULTIPART_BYTES
+        self._scene_bytes = settings.upload_bytes + FORM_BYTES
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """As ASGI has it."""

@@ -13,8 +13,11 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import BaseModel, Field
 
 from lfd_render.engine.jobs import SceneSource
 from lfd_render.errors import SceneError
@@ -28,17 +31,49 @@ _log = logging.getLogger("lfd_render.service")
 SUFFIXES = (".glb", ".gltf", ".obj")
 _MOST_FILES = 512
 _MOST_PARTS = 8  # folders deep
+FORM_BYTES = 1 << 20  # what headers of a form's parts may take besides the files
+
+
+class SceneAnswer(BaseModel):
+    """A scene that the server has. created: seconds since 1970; None for built-in scenes, of which
+    the rest is known when they are rendered."""
+
+    id: str = Field(examples=["builtin:spheres"])
+    main: str = Field(description="The file that is the scene.")
+    created: float | None = None
+    files: dict[str, int] = Field(default_factory=dict, description="Bytes by name.")
+    triangles: int | None = None
+    meshes: int | None = None
+    materials: int | None = None
+    images: int | None = None
+    lights: int | None = None
+    cameras: list[str] = Field(default_factory=list, description="Names for `camera`.")
+    bounds: Annotated[list[list[float]], Field(min_length=2, max_length=2)] | None = Field(
+        None, description="Lowest and highest corner of the scene's box."
+    )
+    bytes: int | None = Field(None, description="What it takes in memory.")
+    warnings: list[str] = Field(default_factory=list)
 
 
 @dataclass(frozen=True)
 class StoredScene:
-    """An uploaded scene. main: the file that is the scene; facts: what a render process found."""
+    """An uploaded scene. main: the file that is the scene; facts: what a render process found.
+
+    Raises ValidationError, a ValueError, for what another version may have written."""
 
     id: str
     main: str
     files: dict[str, int]  # bytes by relative name
     created: float  # seconds since 1970
     facts: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        _ = self.described
+
+    @cached_property
+    def described(self) -> SceneAnswer:
+        """As answers tell of it."""
+        return SceneAnswer.model_validate(self.facts | asdict(self))
 
 
 class Upload:
@@ -163,6 +198,7 @@ class SceneStore:
             else:
                 _log.warning("scene cannot be read and is left alone", extra={"folder": left.name})
         self._gone: dict[str, Path] = {}  # deleted, still leased
+        self._coming: list[int] = []  # bytes that uploads may bring
 
     def all(self) -> list[StoredScene]:
         """All of them, the newest first."""
@@ -208,15 +244,46 @@ class SceneStore:
             shutil.rmtree(gone, ignore_errors=True)
 
     @contextmanager
-    def upload(self) -> Iterator[Upload]:
-        """A place for a new scene's files, removed unless it is added. Raises ProblemError."""
+    def upload(self, length: int | None) -> Iterator[Upload]:
+        """A place for a new scene's files, removed unless it is added. length: of the body, if it
+        is known. Raises ProblemError when there is no room, before any of it is read."""
         settings = self._settings
+        count = settings.upload_bytes if length is None else length
+        if len(self._coming) >= settings.max_uploads:
+            raise ProblemError(
+                429, f"{len(self._coming)} scenes are being uploaded; ask again in 10 s", None,
+                {"Retry-After": "10"},
+            )  # fmt: skip
+        if not self._is_room(count) and not self._may_be_kept(length):
+            raise self._full()
         folder = self._folder / f".{uuid.uuid4().hex}"
-        (folder / "files").mkdir(parents=True)
+        self._coming.append(count)
         try:
+            (folder / "files").mkdir(parents=True)
             yield Upload(folder / "files", settings.upload_bytes)
         finally:
+            self._coming.remove(count)
             shutil.rmtree(folder, ignore_errors=True)
+
+    def _is_room(self, count: int) -> bool:
+        """Whether one scene more may be kept, of so many bytes besides those that are coming."""
+        settings = self._settings
+        total = self._held() + sum(self._coming) + count
+        return len(self._scenes) < settings.max_scenes and total <= settings.max_scenes_mb << 20
+
+    def _held(self) -> int:
+        return sum(sum(scene.files.values()) for scene in self._scenes.values())
+
+    def _may_be_kept(self, length: int | None) -> bool:
+        """Whether a body of this length, alone or as a form, may be of a scene that is there."""
+        sizes = (sum(scene.files.values()) for scene in self._scenes.values())
+        return length is not None and any(0 <= length - size <= FORM_BYTES for size in sizes)
+
+    def _full(self) -> ProblemError:
+        return ProblemError(
+            507, f"{len(self._scenes)} scenes of {self._held()} bytes are kept, and "
+            f"{sum(self._coming)} bytes are coming; delete one first", "scenes",
+        )  # fmt: skip
 
     def candidate(self, upload: Upload, main: str) -> SceneSource:
         """An upload as a scene to look into, before it is added."""
@@ -227,16 +294,12 @@ class SceneStore:
         scene = StoredScene(upload.id(main), main, upload.files, time.time(), facts)
         if scene.id in self._scenes:
             return self._scenes[scene.id], False
-        held = sum(sum(scene.files.values()) for scene in self._scenes.values())
-        most = self._settings
-        if len(self._scenes) >= most.max_scenes or held >= most.max_scenes_mb << 20:
-            raise ProblemError(
-                507, f"{len(self._scenes)} scenes of {held} bytes are kept; delete one first",
-                "scenes",
-            )  # fmt: skip
+        if not self._is_room(0):
+            raise self._full()
         (upload.folder.parent / "scene.json").write_text(json.dumps(asdict(scene)), "utf-8")
         gone = self._gone.pop(scene.id, None)
         if gone is None:
+            shutil.rmtree(self._folder / scene.id, ignore_errors=True)  # where it cannot be read
             upload.folder.parent.rename(self._folder / scene.id)
         else:  # it has come back before its last picture was done
             (upload.folder.parent / "scene.json").rename(gone / "scene.json")

@@ -9,7 +9,7 @@ from typing import Annotated
 from fastapi import APIRouter, Request, Response
 from fastapi import Path as PathParameter
 from fastapi.concurrency import run_in_threadpool
-from pydantic import BaseModel, Field
+from pydantic import BaseModel
 from starlette.datastructures import UploadFile
 
 from lfd_render.engine import encoding
@@ -18,7 +18,7 @@ from lfd_render.scene.builtin import BUILTINS, PREFIX
 
 from .answers import racing
 from .problems import ProblemError, links, responses
-from .scene_store import StoredScene, Upload
+from .scene_store import SceneAnswer, Upload
 from .state import Shared, State
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
@@ -34,36 +34,10 @@ _MOST_PARTS = 512
 SceneId = Annotated[str, PathParameter(max_length=100, examples=["builtin:spheres"])]
 
 
-class SceneAnswer(BaseModel):
-    """A scene that the server has. created: seconds since 1970; None for built-in scenes, of which
-    the rest is known when they are rendered."""
-
-    id: str = Field(examples=["builtin:spheres"])
-    main: str = Field(description="The file that is the scene.")
-    created: float | None = None
-    files: dict[str, int] = Field(default_factory=dict, description="Bytes by name.")
-    triangles: int | None = None
-    meshes: int | None = None
-    materials: int | None = None
-    images: int | None = None
-    lights: int | None = None
-    cameras: list[str] = Field(default_factory=list, description="Names for `camera`.")
-    bounds: Annotated[list[list[float]], Field(min_length=2, max_length=2)] | None = Field(
-        None, description="Lowest and highest corner of the scene's box."
-    )
-    bytes: int | None = Field(None, description="What it takes in memory.")
-    warnings: list[str] = Field(default_factory=list)
-
-
 class SceneList(BaseModel):
     """All scenes, the newest first, then those built in."""
 
     scenes: list[SceneAnswer]
-
-
-def _answer(scene: StoredScene) -> SceneAnswer:
-    known = {"id": scene.id, "main": scene.main, "created": scene.created, "files": scene.files}
-    return SceneAnswer.model_validate(known | scene.facts)
 
 
 @router.get("", summary="All scenes", responses=responses())
@@ -71,7 +45,7 @@ async def list_scenes(state: Shared) -> SceneList:
     """Those uploaded, the newest first, then those built in."""
     names = [f"{PREFIX}{name}" for name in sorted(BUILTINS)]
     own = [SceneAnswer.model_validate({"id": name, "main": name}) for name in names]
-    return SceneList(scenes=[*map(_answer, state.scenes.all()), *own])
+    return SceneList(scenes=[*(scene.described for scene in state.scenes.all()), *own])
 
 
 _TRIANGLE = {
@@ -142,7 +116,8 @@ async def upload_scene(request: Request, response: Response, state: Shared) -> S
     Its id is made of its content: the same scene gets the same id.
     """
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    with state.scenes.upload() as upload:
+    length = request.headers.get("content-length")
+    with state.scenes.upload(int(length) if length else None) as upload:
         if kind == "multipart/form-data":
             main = upload.main(await _take_form(request, upload))
         elif kind in _SINGLE:
@@ -160,7 +135,7 @@ async def upload_scene(request: Request, response: Response, state: Shared) -> S
         scene, new = state.scenes.add(upload, main, found.report)
     response.status_code = 201 if new else 200
     response.headers["Location"] = f"/v1/scenes/{scene.id}"
-    return _answer(scene)
+    return scene.described
 
 
 async def _take(pieces: AsyncIterator[bytes], upload: Upload, name: str) -> None:
@@ -202,7 +177,7 @@ async def _pieces(file: UploadFile) -> AsyncIterator[bytes]:
 async def get_scene(request: Request, scene: SceneId, state: Shared) -> SceneAnswer:
     """What a scene holds."""
     if not scene.startswith(PREFIX):
-        return _answer(state.scenes.get(scene))
+        return state.scenes.get(scene).described
     with state.scenes.source(scene) as source:
         found = await racing(request, state, Job(SceneFacts(), encoding.JSON, source))
     return SceneAnswer.model_validate({"id": scene, "main": scene} | found.report)

@@ -69,6 +69,7 @@ class Settings(BaseModel):
     max_jobs: Whole = Field(100, description="Jobs at a time, those that have ended included.")
     max_streams: Whole = Field(16, description="Streams at a time.")
     max_upload_mb: Whole = Field(256, description="Size of an uploaded scene, all files together.")
+    max_uploads: Whole = Field(8, description="Scenes that are uploaded at a time.")
     max_scenes: Whole = Field(1000, description="Uploaded scenes that are kept at a time.")
     max_scenes_mb: Whole = Field(16384, description="Size of all uploaded scenes on disk.")
     max_displays: Whole = Field(1000, description="Displays that are kept besides those shipped.")

@@ -332,15 +332,63 @@ def test_what_a_killed_deletion_left_is_cleared(
 def test_scenes_that_cannot_be_read_are_left_alone(
     start: Start, triangle: bytes, tmp_path: Path
 ) -> None:
-    """Another version's, say, whose facts have other names."""
+    """Another version's, say, whose facts have other names or kinds."""
+    content = (triangle, triangle + b" ")
+    others = ({"later": 1}, {"facts": {"bounds": "large"}})
+
+    def uploaded(client: httpx.Client, number: int) -> httpx.Response:
+        return client.post("/v1/scenes", content=content[number], headers=GLTF)
+
     with start(python_path=CHEAP, data_dir=tmp_path) as server, server.client() as client:
-        scene = client.post("/v1/scenes", content=triangle, headers=GLTF).json()["id"]
-    told = tmp_path / "scenes" / scene / "scene.json"
-    ours = told.read_text("utf-8")
-    told.write_text(json.dumps(json.loads(ours) | {"later": 1}), "utf-8")
+        scenes = [uploaded(client, number).json()["id"] for number in range(2)]
+    told = [tmp_path / "scenes" / scene / "scene.json" for scene in scenes]
+    ours = told[0].read_text("utf-8")
+    for file, other in zip(told, others, strict=True):
+        file.write_text(json.dumps(json.loads(file.read_text("utf-8")) | other), "utf-8")
     with start(python_path=CHEAP, data_dir=tmp_path) as server, server.client() as client:
-        assert client.get(f"/v1/scenes/{scene}").status_code == 404
+        for scene in scenes:
+            assert client.get(f"/v1/scenes/{scene}").status_code == 404
         assert client.get("/v1/scenes").status_code == 200
-    told.write_text(ours, "utf-8")
+        assert all(file.exists() for file in told)
+        assert uploaded(client, 1).status_code == 201
+        assert client.get(f"/v1/scenes/{scenes[1]}").status_code == 200
+    told[0].write_text(ours, "utf-8")
     with start(python_path=CHEAP, data_dir=tmp_path) as server, server.client() as client:
-        assert client.get(f"/v1/scenes/{scene}").status_code == 200
+        for scene in scenes:
+            assert client.get(f"/v1/scenes/{scene}").status_code == 200
+
+
+def test_scenes_that_do_not_fit_are_refused_before_they_come(start: Start, triangle: bytes) -> None:
+    """Bytes that others are sending count as theirs, and so many may send at a time."""
+
+    def fill(size: int) -> bytes:
+        return triangle[:-1] + b" " * (size - len(triangle)) + b"}"
+
+    limits = {"max_scenes_mb": 1, "max_uploads": 2, "max_upload_mb": 1}
+    with start(python_path=CHEAP, **limits) as server, server.client() as client:
+
+        def begun(size: int) -> socket.socket:
+            """An upload of which only the first lines come."""
+            raw = socket.create_connection((client.base_url.host, client.base_url.port or 0))
+            head = "POST /v1/scenes HTTP/1.1\r\nHost: localhost\r\nContent-Type: model/obj\r\n"
+            raw.sendall(f"{head}Content-Length: {size}\r\n\r\n".encode())
+            raw.settimeout(0.3)
+            return raw
+
+        def upload(size: int) -> int:
+            return client.post("/v1/scenes", content=fill(size), headers=GLTF).status_code
+
+        with begun(700_000) as one, pytest.raises(TimeoutError):
+            one.recv(1)  # it is waited for
+        until(lambda: upload(400_000) == 201)
+        with begun(400_000) as one, begun(1_000) as two:
+            for each in (one, two):
+                with pytest.raises(TimeoutError):
+                    each.recv(1)
+            assert upload(2_000) == 429
+            two.close()
+            until(lambda: upload(400_000) == 200)  # it is there
+            with begun(300_000) as three:
+                assert three.recv(12) == b"HTTP/1.1 507"
+        until(lambda: upload(300_000) == 201)
+        assert upload(400_001) == 507
