@@ -13,7 +13,7 @@ pytestmark = pytest.mark.needs("gl")
 
 LATER = {"Prefer": "respond-async"}
 # Some seconds of eyes, each of which takes a few milliseconds: what is called off ends soon.
-LONG = {"picture": "look", "scene": SCENE, "sweep": "-10:10:400", "size": "640x360"}
+LONG = {"picture": "look", "scene": SCENE, "sweep": "-10:10:400", "size": "480x270"}
 
 
 def finished(client: httpx.Client, job: str) -> dict[str, Any]:

@@ -194,7 +194,7 @@ def test_streams_end_with_the_server(start: Start, profile: dict[str, Any]) -> N
             "/v1/jobs",
             json={"pictures": [{
                 "picture": "look", "scene": "builtin:spheres", "display": profile,
-                "sweep": "-10:10:1000", "size": "640x360",
+                "sweep": "-10:10:1000", "size": "320x180",
             }]},
         ).headers["location"]  # fmt: skip
         with (
