@@ -17,23 +17,24 @@ from .state import State
 
 async def answer(request: Request, state: State, job: Job) -> Response:
     """The job's picture, 304 where the client has it, 202 where it asks to be answered later."""
-    headers = {"ETag": (tag := f'"{job.key}"'), **ALWAYS}
+    name = state.pool.tag(job)
+    headers = {"ETag": (tag := f'"{name}"'), **ALWAYS}
     if matches(request.headers.get("if-none-match"), tag):
         state.metrics.cached.labels("not modified").inc()
         return Response(status_code=304, headers=headers)
     if request.method == "HEAD":
         return _bare(headers | {"Content-Type": job.media})
-    picture = state.answers.get(job.key)
+    picture = state.answers.get(name)
     if picture is not None:
         state.metrics.cached.labels("answer").inc()
         headers["Server-Timing"] = 'cache;desc="hit"'
     elif wants_later(request):
-        return accepted(request, state, [job])
+        return await accepted(request, state, [job])
     else:
         result = await racing(request, state, job)
         request.scope["lfd.spans"] = result.timings_ms
         picture = Picture.of(job, result)
-        state.answers.put(job.key, picture, len(picture.body))
+        state.answers.put(name, picture, len(picture.body))
         headers["Server-Timing"] = server_timing(result.timings_ms)
     return PiecesResponse(picture.body, headers=headers | picture.headers, media_type=job.media)
 

@@ -46,14 +46,15 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     """The application with these settings, by default the environment's. Raises UsageError."""
     chosen = settings or Settings.from_environment()
     log_json(chosen.log_level)
-    pool = Pool(chosen.pool)
+    answers: ByteLru[Picture] = ByteLru(chosen.answer_cache_mb << 20)
+    pool = Pool(chosen.pool, answers.clear)
     streaming = Slots(chosen.max_streams)
     metrics = Metrics(pool, streaming)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         try:
-            async with _running(chosen, pool, metrics, streaming) as app.state.lfd:
+            async with _running(chosen, pool, answers, metrics, streaming) as app.state.lfd:
                 tell_of_signals(app.state.lfd.ending)
                 app.openapi()  # made once: for a third of a second nobody is served
                 yield
@@ -66,6 +67,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         version=__version__,
         description=_DESCRIPTION,
         lifespan=lifespan,
+        docs_url=None,  # their viewers come from elsewhere
         redoc_url=None,
     )
     app.state.failure = None  # why it could not start
@@ -93,14 +95,13 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
 @asynccontextmanager
 async def _running(
-    settings: Settings, pool: Pool, metrics: Metrics, streaming: Slots
+    settings: Settings, pool: Pool, answers: ByteLru[Picture], metrics: Metrics, streaming: Slots
 ) -> AsyncIterator[State]:
     """What handlers share, from the first render process to the last. Raises LfdError."""
     with data_folder(settings.data_dir) as folder:
         stored = SceneStore(folder / "scenes", settings)
         jobs_made = JobStore(folder / "jobs", settings, pool, stored)
         kept = DisplayStore(folder / "displays", settings.max_displays)
-        answers: ByteLru[Picture] = ByteLru(settings.answer_cache_mb << 20)
         await pool.start()
         try:
             yield State(settings, pool, stored, kept, jobs_made, answers, metrics, streaming)

@@ -23,6 +23,7 @@ from .fields import DisplayName, Fields
 from .jobs import LATER
 from .media import choose
 from .problems import ProblemError, links, responses
+from .responses import matches
 from .state import Shared
 
 router = APIRouter(prefix="/v1", tags=["displays"])
@@ -121,7 +122,7 @@ async def get_display(request: Request, name: Name, state: Shared) -> Response:
     """The profile file, as docs/profiles.md has it."""
     text = state.displays.get(name).to_json()
     tag = f'"{hashlib.sha256(text.encode()).hexdigest()[:32]}"'
-    if request.headers.get("if-none-match") == tag:
+    if matches(request.headers.get("if-none-match"), tag):
         return Response(status_code=304, headers={"ETag": tag})
     return Response(text, headers={"ETag": tag}, media_type="application/json")
 

@@ -82,7 +82,8 @@ class SameSite:
                 )  # fmt: skip
             return
         site, shown = headers.get("sec-fetch-site", "none"), headers.get("sec-fetch-dest")
-        visit = shown == "document" and scope.get("method") == "GET"  # a link that was followed
+        # A link to the page that was followed; what else is shown could work for a page elsewhere.
+        visit = shown == "document" and scope.get("method") == "GET" and is_page(scope["path"])
         if site not in ("none", "same-origin") and not visit:
             raise ProblemError(
                 403, f"Sec-Fetch-Site: '{site[:40]}'; pages elsewhere may not use this server",
@@ -104,22 +105,24 @@ class Keys:
         """As ASGI has it."""
         if scope["type"] in ("http", "websocket") and not _is_open(scope["path"]):
             try:
-                self._take(self._who(scope))
+                scope["lfd.who"] = self._who(scope)
+                self._take(scope["lfd.who"])
             except ProblemError as error:
                 await refuse(scope, receive, send, error)
                 return
         await self._app(scope, receive, send)
 
     def _who(self, scope: Scope) -> str:
-        client = (scope.get("client") or ("",))[0]
+        headers = Headers(scope=scope)
         if not self._keys:
-            if not is_loopback(client):
+            # None: through a socket file. Whom a proxy there speaks for, uvicorn does not tell.
+            client = scope.get("client")
+            if "x-forwarded-for" in headers if client is None else not is_loopback(client[0]):
                 raise ProblemError(
                     403, "only clients on this machine may use a server without keys; set "
                     "LFD_API_KEYS", "client",
                 )  # fmt: skip
-            return str(client)
-        headers = Headers(scope=scope)
+            return "this machine"  # whichever of its addresses a client says it has
         given = headers.get("x-api-key", "")
         kind, _, token = headers.get("authorization", "").partition(" ")
         if kind.lower() == "bearer":

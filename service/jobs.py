@@ -119,10 +119,12 @@ def wants_later(request: Request) -> bool:
     return any(part.partition(";")[0].strip() == "respond-async" for part in said)
 
 
-def accepted(request: Request, state: State, jobs: Sequence[Job]) -> Response:
+async def accepted(request: Request, state: State, jobs: Sequence[Job]) -> Response:
     """The answer 202 of jobs that are made from now on."""
-    key = request.headers.get("idempotency-key")
-    return _answer(state.jobs.create(jobs, key), 202, {"Preference-Applied": "respond-async"})
+    given = request.headers.get("idempotency-key")
+    key = None if given is None else (request.scope["lfd.who"], given)
+    stored = await state.jobs.create(jobs, key)
+    return _answer(stored, 202, {"Preference-Applied": "respond-async"})
 
 
 def _described(stored: StoredJob) -> JobAnswer:
@@ -181,7 +183,7 @@ async def create_job(
                 told, field = as_problem(error), f"pictures.{number}"
                 raise ProblemError(told.status_code, f"{field}: {told.detail}", field) from None
             await asyncio.sleep(0)  # others' turn
-        return accepted(request, state, jobs)
+        return await accepted(request, state, jobs)
 
 
 @router.get(

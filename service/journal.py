@@ -1,4 +1,4 @@
-"""The outermost layer: request ids, a JSON line a request, metrics, errors nobody expected."""
+"""The outermost layer: request ids, a JSON line a request or socket, metrics, unexpected errors."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import sys
 import time
 import traceback
 import uuid
+from contextlib import suppress
 from typing import Any
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -21,6 +22,7 @@ from .problems import problem
 _log = logging.getLogger("lfd_render.service")
 _OURS = ("lfd_render", "uvicorn.error")
 _CLIENT_GONE = 499
+_INTERNAL = 1011  # why a socket closes (RFC 6455, section 7.4)
 _METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS")  # others make no series of their own
 _PLAIN = set(vars(logging.makeLogRecord({}))) | {"message", "asctime", "color_message"}
 
@@ -61,9 +63,10 @@ class Journal:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """As ASGI has it."""
-        if scope["type"] != "http":
+        if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
+        socket = scope["type"] == "websocket"
         given = Headers(scope=scope).get("x-request-id", "")
         known = re.fullmatch(r"[\w.-]{1,64}", given)
         scope["request_id"] = given if known else uuid.uuid4().hex[:16]
@@ -75,28 +78,41 @@ class Journal:
             if message["type"] == "http.response.start":
                 status = message["status"]
                 MutableHeaders(scope=message)["X-Request-Id"] = scope["request_id"]
-            sent += len(message.get("body", b""))
+            elif message["type"] == "websocket.close":
+                status = message.get("code", 1000)
+            sent += len(message.get("body") or message.get("bytes") or message.get("text") or b"")
             await send(message)
+
+        async def heard() -> Message:
+            nonlocal status
+            message = await receive()
+            if message["type"] == "websocket.disconnect":
+                status = status or message.get("code", 1005)
+            return message
 
         trace = None
         try:
-            await self._app(scope, receive, noting)
+            await self._app(scope, heard if socket else receive, noting)
         except ClientGoneError:
             status = _CLIENT_GONE
         except Exception:
             trace = traceback.format_exc()
-            if not status:
+            if socket:
+                with suppress(Exception):  # it may be closed
+                    await noting({"type": "websocket.close", "code": _INTERNAL})
+            elif not status:
                 detail = "internal error; the server's log says more"
                 await problem(scope["request_id"], 500, detail)(scope, receive, noting)
         seconds = time.perf_counter() - started
-        self._count(scope, status, seconds)
+        if not socket:  # they stay open as long as they like, and clients say why they close
+            self._count(scope, status, seconds)
         if trace or scope["path"] not in ("/livez", "/readyz", "/metrics"):
             _log.log(
                 logging.ERROR if trace else logging.INFO,
                 "request",
                 extra={
                     "request_id": scope["request_id"],
-                    "method": scope["method"],
+                    "method": scope.get("method", "WEBSOCKET"),
                     "path": scope["path"],
                     "query": scope["query_string"].decode("latin-1"),
                     "status": status,

@@ -8,6 +8,7 @@ from pathlib import Path
 from fastapi import APIRouter, Request, Response
 
 from .problems import ProblemError
+from .responses import matches
 
 router = APIRouter(include_in_schema=False)
 
@@ -43,7 +44,7 @@ def _file(request: Request, name: str) -> Response:
         raise ProblemError(404, f"{FOLDER}{name[:100]}: is no part of the page")
     tag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
     headers = _HEADERS | {"ETag": tag}
-    if request.headers.get("if-none-match") == tag:
+    if matches(request.headers.get("if-none-match"), tag):
         return Response(status_code=304, headers=headers)
     return Response(body, headers=headers, media_type=_MEDIA[Path(name).suffix])
 

@@ -22,6 +22,10 @@ from .settings import Settings
 
 _KEEP_ALIVE_S = 30
 _HEARING_S = 0.5  # until those whose connection is made have been accepted and have begun to speak
+_CROWDED = (
+    b"HTTP/1.1 429 Too Many Requests\r\nRetry-After: 10\r\nConnection: close\r\n"
+    b"Content-Length: 0\r\n\r\n"
+)  # sent before anything is read, so that the connection takes no more than its place
 _SO_ATTACH_FILTER = 26  # linux/socket.h
 _BPF_RETURN = 6  # linux/bpf_common.h: BPF_RET | BPF_K
 
@@ -43,7 +47,7 @@ def run(settings: Settings, say: Callable[[str], None]) -> None:
         said = f"[{host}]" if ":" in host else host
         server = _Server(
             uvicorn.Config(
-                app, http=_patient(settings.idle_s), lifespan="on",
+                app, http=_patient(settings.idle_s, settings.max_connections), lifespan="on",
                 log_config=None, access_log=False, server_header=False,
                 timeout_keep_alive=_KEEP_ALIVE_S,
                 timeout_graceful_shutdown=round(settings.drain_s) + 1,
@@ -84,15 +88,21 @@ def _listening(settings: Settings) -> socket.socket:
     return made
 
 
-def _patient(idle_s: float) -> type[H11Protocol]:
+def _patient(idle_s: float, most: int) -> type[H11Protocol]:
     """HTTP that hangs up on clients who have not begun a request for so long, or not finished its
-    first lines. Bodies and answers have times of their own."""
+    first lines. Bodies and answers have times of their own. most: connections of one address."""
 
     class Patient(H11Protocol):
         _last: RequestResponseCycle | None = None  # when it was looked at last
 
         def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
             super().connection_made(transport)
+            if most and self.client:
+                ends = [getattr(each, "client", None) for each in self.connections]
+                if sum(end is not None and end[0] == self.client[0] for end in ends) > most:
+                    transport.write(_CROWDED)
+                    transport.close()
+                    return
             self.loop.call_later(idle_s, self._look)
 
         def _look(self) -> None:

@@ -43,7 +43,12 @@ class Settings(BaseModel):
         (), description="Origins of web pages that may use the server from elsewhere."
     )
     rate_per_minute: int = Field(
-        0, ge=0, description="Requests a minute for each key, or address without keys; 0: any."
+        0,
+        ge=0,
+        description="Requests a minute with each key, or without keys of all clients; 0: any.",
+    )
+    max_connections: int = Field(
+        0, ge=0, description="Connections of one address; a proxy's are all its clients'. 0: any."
     )
     queue: Whole = Field(32, description="Pictures that may wait for a render process.")
     deadline_s: Seconds = Field(60.0, description="Seconds a picture may take, queue included.")

@@ -15,7 +15,7 @@ from contextlib import suppress
 from typing import Annotated, Any, Literal, TypeVar
 
 from fastapi import APIRouter, Query, Response, WebSocket, WebSocketDisconnect
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from lfd_render.engine import encoding
 from lfd_render.engine.jobs import Job, Result
@@ -45,7 +45,12 @@ class Moving(BaseModel):
         15.0, description="Degrees to either side, where it goes to and fro."
     )
     fps: float = Field(12.0, ge=0.01, le=60, description="Frames a second at most.")
-    frames: int | None = Field(None, ge=1, le=1_000_000, description="End after so many.")
+    frames: int | None = Field(
+        None,
+        ge=1,
+        le=1_000_000,
+        description="End before the frame of this number; slow readers get fewer.",
+    )
 
     def turned(self, frame: int) -> float:
         """Degrees of a full turn."""
@@ -96,6 +101,8 @@ class PlayerQuery(EiaQuery, Moving):
 
 class Said(Fields):
     """What a player says: which frame it has shown, and where the camera is to go."""
+
+    model_config = ConfigDict(strict=True)
 
     ack: int | None = Field(None, ge=0)
     yaw: Degrees | None = None
@@ -224,7 +231,7 @@ class _Player:
         finally:
             for task in tasks:
                 task.cancel()
-            await asyncio.wait(tasks)
+            await asyncio.gather(*tasks, return_exceptions=True)  # the first one's error counts
 
     async def _listen(self) -> None:
         while True:
@@ -257,7 +264,7 @@ class _Player:
             shown = query
             about = {
                 "frame": frame, "media": job.media, "size": result.report["size"],
-                "bytes": len(result.body), "etag": job.key, "yaw": query.yaw,
+                "bytes": len(result.body), "etag": self._state.pool.tag(job), "yaw": query.yaw,
                 "pitch": query.pitch, "timings_ms": result.timings_ms,
             }  # fmt: skip
             self._sent.append(frame)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import io
+import os
+import shutil
 import tempfile
 import zipfile
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -66,7 +69,7 @@ def most_seconds(media: str, pixels: int) -> float:
 def exr(linear: NDArray[np.float16], text: Mapping[str, str]) -> bytes:
     """OpenEXR of scene-linear half floats [y, x, 3]. Raises OutputError without a place for it."""
     try:
-        with tempfile.TemporaryDirectory(prefix="lfd-render-") as folder:
+        with tempfile.TemporaryDirectory(prefix=_prefix(os.getpid())) as folder:
             file = Path(folder) / "picture.exr"  # the library writes files alone
             write_exr(file, linear, text)
             return file.read_bytes()
@@ -74,6 +77,17 @@ def exr(linear: NDArray[np.float16], text: Mapping[str, str]) -> bytes:
         raise OutputError(
             f"image/x-exr: no place for a file on its way: {error.strerror}"
         ) from error
+
+
+def clear_up(pid: int) -> None:
+    """Remove what a process that was killed has left of files on their way, if that can be."""
+    with suppress(OSError):
+        for left in Path(tempfile.gettempdir()).glob(f"{_prefix(pid)}*"):
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _prefix(pid: int) -> str:
+    return f"lfd-render-{pid}-"
 
 
 def zipped(files: Iterable[tuple[str, bytes]]) -> bytes:

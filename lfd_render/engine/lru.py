@@ -40,6 +40,11 @@ class ByteLru(Generic[T]):
         while self.bytes > self._limit:
             self.drop(next(iter(self._items)))
 
+    def clear(self) -> None:
+        """Forget everything."""
+        self._items.clear()
+        self.bytes = 0
+
     def drop(self, key: str) -> None:
         """Forget a key, which need not be there."""
         _, weight = self._items.pop(key, (None, 0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import logging
 import signal
 import time
@@ -83,12 +84,15 @@ class Pool:
     others; where there is but one, they give way, and are begun again in a lull.
     """
 
-    def __init__(self, settings: PoolSettings) -> None:
+    def __init__(self, settings: PoolSettings, shed: Callable[[], None] = lambda: None) -> None:
+        """shed: lets go of what keeps file descriptors and can be made again."""
         self.settings = settings
+        self._shed = shed
         self.counts: Counter[str] = Counter()  # jobs by outcome, and restarts
         self._busy: dict[RenderProcess, _Ticket | None] = {}
         self._waiting: list[_Ticket] = []
         self._deaths: dict[str, list[float]] = {}  # when, by a scene's id or an order's key
+        self._made_by: set[str] = set()  # the GL renderers there have been
         self._number = 0
         self._failed_starts = 0
         self._trouble = ""
@@ -152,6 +156,12 @@ class Pool:
         self.counts["done"] += 1
         result.timings_ms["queue"] = round(1000 * (ticket.started - ticket.submitted), 3)
         return result
+
+    def tag(self, job: Job) -> str:
+        """What names the bytes of a job's answer: its key, and the GL renderers that may make
+        it."""
+        renderers = repr(sorted(self._made_by)).encode()
+        return f"{job.key}-{hashlib.sha256(renderers).hexdigest()[:8]}"
 
     def forget(self, scene: str) -> None:
         """Let all processes drop a scene."""
@@ -303,6 +313,7 @@ class Pool:
         match message:
             case Ready():
                 process.renderer, process.software = message.renderer, message.software
+                self._made_by.add(message.renderer)
                 self._failed_starts = 0
                 self._dispatch()
             case NotReady():
@@ -374,6 +385,7 @@ class Pool:
             self._spawn()
         except OSError as error:
             _log.error("no render process can be started", extra={"why": str(error)})
+            self._shed()
             asyncio.get_running_loop().call_later(_LACK_S, self._spawn_later)
 
     def _mourn(self, process: RenderProcess, ticket: _Ticket) -> None:

@@ -16,6 +16,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from lfd_render.engine.bodies import receive_body
+from lfd_render.engine.encoding import clear_up
 from lfd_render.engine.jobs import Done, Holds
 from lfd_render.engine.worker import WorkerConfig
 from lfd_render.errors import LfdError
@@ -113,6 +114,7 @@ class RenderProcess:
         except (EOFError, OSError, LfdError):
             self.kill()  # where it is not gone, what it says can no longer be followed
             self._popen.wait()
+            clear_up(self.pid)
             self._pipe.close()
             self._tell(self._on_end, self)
 

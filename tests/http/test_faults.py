@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import socket
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -112,10 +113,15 @@ def test_killed_processes_lose_no_request(
     measured("slowest /livez meanwhile", f"{1000 * slowest:.0f} ms")
 
 
-def test_a_scene_that_crashes_is_refused(client: httpx.Client) -> None:
+def test_a_scene_that_crashes_is_refused(server: Server, client: httpx.Client) -> None:
+    pids = server.render_pids()
     before = metric(client, "lfd_process_restarts_total")
     assert "ends the process" in problem(eia(client, scene(1), seed=CRASH), 422)["detail"]
     assert metric(client, "lfd_process_restarts_total") - before == 2
+    ended = set(pids) - set(server.render_pids())
+    temporary = Path(tempfile.gettempdir())
+    assert ended
+    assert not [left for pid in ended for left in temporary.glob(f"lfd-render-{pid}-*")]
     assert "is refused" in problem(eia(client, scene(1)), 422)["detail"]
     assert metric(client, "lfd_process_restarts_total") - before == 2
     assert eia(client, scene(2)).status_code == 200

@@ -18,7 +18,7 @@ from starlette.types import Message, Receive, Scope, Send
 
 from lfd_render.errors import UsageError
 
-from .conftest import GLTF, PATH, PROFILE, Server, Start
+from .conftest import GLTF, PATH, PROFILE, SCENE, Server, Start
 
 pytestmark = pytest.mark.needs("gl")
 KEY = "a key of the tests"
@@ -41,7 +41,7 @@ def server(start: Start) -> Iterator[Server]:
 def guarded(start: Start) -> Iterator[Server]:
     """One that asks for a key, and for patience."""
     keys = f"another,{KEY}"
-    with start(api_keys=keys, rate_per_minute=60, cors_origins="https://shop.example") as server:
+    with start(api_keys=keys, rate_per_minute=72, cors_origins="https://shop.example") as server:
         yield server
 
 
@@ -271,8 +271,9 @@ def test_displays_are_kept_and_checked(client: httpx.Client) -> None:
     assert client.put("/v1/displays/mine", json=PROFILE).status_code == 200
     kept = client.get("/v1/displays/mine")
     assert kept.json()["lens"] == PROFILE["lens"]
-    unchanged = client.get("/v1/displays/mine", headers={"If-None-Match": kept.headers["etag"]})
-    assert unchanged.status_code == 304
+    for tags in (kept.headers["etag"], f'"other", W/{kept.headers["etag"]}', "*"):
+        unchanged = client.get("/v1/displays/mine", headers={"If-None-Match": tags})
+        assert unchanged.status_code == 304
     converted = client.post("/v1/convert-display", json={"display": "mine", "to": "van-berkel"})
     assert json.loads(converted.json()["text"])
     bad = json.loads(json.dumps(PROFILE))
@@ -284,6 +285,13 @@ def test_displays_are_kept_and_checked(client: httpx.Client) -> None:
     problem(client.put("/v1/displays/auto", json=PROFILE), 409)
     assert client.delete("/v1/displays/mine").status_code == 204
     problem(client.get("/v1/displays/mine"), 404)
+
+
+def test_odd_methods_make_no_series(client: httpx.Client) -> None:
+    problem(client.request("PROPFIND", "/v1/displays"), 405)
+    told = client.get("/metrics").text
+    assert 'method="other"' in told
+    assert "PROPFIND" not in told
 
 
 def test_methods_and_media_are_checked(client: httpx.Client) -> None:
@@ -304,7 +312,7 @@ def test_methods_and_media_are_checked(client: httpx.Client) -> None:
         ({"Sec-Fetch-Site": "cross-site"}, 403),
         ({"Sec-Fetch-Site": "same-site", "Sec-Fetch-Dest": "image"}, 403),
         ({"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Dest": "iframe"}, 403),
-        ({"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Dest": "document"}, 200),
+        ({"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Dest": "document"}, 403),
         ({"Sec-Fetch-Site": "same-origin"}, 200),
         ({"Host": "localhost:8000", "Origin": "http://localhost:8000"}, 200),
         ({}, 200),
@@ -314,6 +322,12 @@ def test_pages_elsewhere_cannot_drive_the_server(
     client: httpx.Client, headers: dict[str, str], status: int
 ) -> None:
     assert client.get("/v1/displays", headers=headers).status_code == status
+
+
+def test_links_elsewhere_lead_to_the_page(client: httpx.Client) -> None:
+    followed = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Dest": "document"}
+    assert client.get("/", headers=followed).status_code == 200
+    assert client.get("/docs").status_code == 404  # whose viewer would come from elsewhere
 
 
 def test_keys_are_asked_for(guarded: Server) -> None:
@@ -328,11 +342,10 @@ def test_keys_are_asked_for(guarded: Server) -> None:
         assert all(KEY not in line for line in guarded.log)
 
 
-def test_strangers_need_a_key() -> None:
+def statuses_of(settings: Settings, clients: list[tuple[str | None, str | None]]) -> list[int]:
+    """What clients of these addresses are answered, each with what a proxy says of it."""
     statuses: list[int] = []
-
-    async def inner(scope: Scope, receive: Receive, send: Send) -> None:
-        await send({"type": "http.response.start", "status": 200})
+    keys = Keys(_answers, settings)
 
     async def send(message: Message) -> None:
         statuses.extend([message["status"]] if "status" in message else [])
@@ -340,10 +353,45 @@ def test_strangers_need_a_key() -> None:
     async def receive() -> Message:
         return {"type": "http.request"}
 
-    for address in ("192.0.2.7", "::ffff:192.0.2.7", "127.0.0.1", "::1"):
-        scope = {"type": "http", "path": "/v1/displays", "headers": [], "client": (address, 9)}
-        asyncio.run(Keys(inner, Settings())(scope, receive, send))
-    assert statuses == [403, 403, 200, 200]
+    for address, told in clients:
+        headers = [(b"x-forwarded-for", told.encode())] if told else []
+        scope: Scope = {"type": "http", "path": "/v1/displays", "headers": headers}
+        scope["client"] = address and (address, 9)
+        asyncio.run(keys(scope, receive, send))
+    return statuses
+
+
+async def _answers(scope: Scope, receive: Receive, send: Send) -> None:
+    await send({"type": "http.response.start", "status": 200})
+
+
+def test_strangers_need_a_key() -> None:
+    addresses = ("192.0.2.7", "::ffff:192.0.2.7", "127.0.0.1", "::1")
+    found = statuses_of(Settings(), [(address, None) for address in addresses])
+    assert found == [403, 403, 200, 200]
+
+
+def test_a_socket_file_is_this_machines() -> None:
+    """But for whom a proxy speaks there."""
+    assert statuses_of(Settings(), [(None, None), (None, "192.0.2.7")]) == [200, 403]
+
+
+def test_addresses_of_this_machine_share_a_rate() -> None:
+    """A client without a key may call itself 127.0.0.2 in X-Forwarded-For, or so be called."""
+    once = Settings(rate_per_minute=6)
+    assert statuses_of(once, [("127.0.0.1", None), ("127.0.0.2", None)]) == [200, 429]
+
+
+def test_idempotency_keys_are_each_clients_own(guarded: Server) -> None:
+    frame = {"picture": "eia", "scene": SCENE, "display": PROFILE}
+    found = []
+    with guarded.client() as client:
+        for seed, key in enumerate((KEY, "another")):
+            headers = {"X-API-Key": key, "Idempotency-Key": "turn"}
+            body = {"pictures": [frame | {"seed": seed}]}
+            found.append(client.post("/v1/jobs", json=body, headers=headers))
+    assert [answer.status_code for answer in found] == [202, 202]
+    assert found[0].json()["id"] != found[1].json()["id"]
 
 
 def test_pages_that_are_allowed_may(guarded: Server) -> None:
@@ -359,7 +407,7 @@ def test_a_key_has_its_rate(guarded: Server) -> None:
     with guarded.client(headers={"X-API-Key": KEY}) as client:
         found = [client.get("/v1/displays") for _ in range(40)]
         refused = [response for response in found if response.status_code != 200]
-        assert len(found) - len(refused) >= 9  # ten at once, less one of the test before
+        assert len(found) - len(refused) >= 9  # twelve at once, less those of the tests before
         for response in refused:
             problem(response, 429)
             assert int(response.headers["retry-after"]) >= 1

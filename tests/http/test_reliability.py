@@ -306,6 +306,24 @@ def test_clients_that_say_nothing_are_hung_up_on(start: Start) -> None:
                     assert mute.recv(1) == b""
 
 
+def test_an_address_has_so_many_connections(start: Start) -> None:
+    with start(python_path=CHEAP, max_connections=3) as server, server.client() as client:
+        where = (client.base_url.host, client.base_url.port)
+        client.get("/livez").raise_for_status()
+        with socket.create_connection(where), socket.create_connection(where) as last:
+            with socket.create_connection(where, timeout=10) as more:
+                assert more.recv(100).startswith(b"HTTP/1.1 429")
+            client.get("/livez").raise_for_status()
+            last.close()
+
+            def again() -> bool:
+                with socket.create_connection(where, timeout=10) as more:
+                    more.sendall(b"GET /livez HTTP/1.1\r\nHost: localhost\r\n\r\n")
+                    return more.recv(100).startswith(b"HTTP/1.1 200")
+
+            until(again)
+
+
 def test_kept_pictures_keep_no_descriptors(start: Start) -> None:
     with start(python_path=CHEAP) as server, server.client() as client:
         place(client)

@@ -119,6 +119,44 @@ def test_a_player_leads_the_camera(server: Server, client: httpx.Client, small: 
             socket.recv(timeout=0.3)  # nothing moves
 
 
+def test_the_last_change_while_frames_are_on_their_way_is_the_next(
+    server: Server, small: str
+) -> None:
+    """None is made of where the camera was meanwhile."""
+    with player(server, f"display={small}&motion=none&fps=60") as socket:
+
+        def frame() -> dict[str, Any]:
+            told = json.loads(socket.recv())
+            socket.recv()
+            return dict(told)
+
+        frame()
+        socket.send(json.dumps({"yaw": 1}))
+        second = frame()  # and two are on their way
+        for yaw in (2, 3, 4):
+            socket.send(json.dumps({"yaw": yaw}))
+            with pytest.raises(TimeoutError):
+                socket.recv(timeout=0.1)
+        socket.send(json.dumps({"ack": second["frame"]}))
+        assert (second["yaw"], frame()["yaw"]) == (1, 4)
+        with pytest.raises(TimeoutError):
+            socket.recv(timeout=0.2)
+
+
+def test_sockets_are_in_the_log(server: Server, small: str) -> None:
+    with player(server, f"display={small}&frames=1", additional_headers={"X-Request-Id": "mine"}):
+        pass
+
+    def told() -> list[dict[str, Any]]:
+        lines = [json.loads(line) for line in server.log]
+        return [line for line in lines if line.get("request_id") == "mine"]
+
+    until(lambda: bool(told()))
+    (line,) = told()
+    assert line["method"] == "WEBSOCKET"
+    assert 1000 <= line["status"] < 1010
+
+
 @pytest.mark.parametrize(
     ("query", "message", "status", "field"),
     [
@@ -128,6 +166,8 @@ def test_a_player_leads_the_camera(server: Server, client: httpx.Client, small: 
         ("display=small&camera=none", None, 422, "camera"),
         ("display=small", "{", 422, "message"),
         ("display=small", '{"yaw": NaN}', 422, "yaw"),
+        ("display=small", '{"yaw": "1"}', 422, "yaw"),
+        ("display=small", '{"ack": "0"}', 422, "ack"),
         ("display=small", '{"shader": "void main() {}"}', 422, "shader"),
     ],
 )

@@ -4,6 +4,7 @@ import mmap
 import os
 import signal
 import sys
+import tempfile
 import time
 
 CRASH, HANG, EAT, SLOW, BREAK, SWELL, LOSE, MUTE = range(900, 908)
@@ -21,7 +22,8 @@ if "lfd_render.engine.worker" in sys.orig_argv:
 
     def make(self, job, progress):  # type: ignore[no-untyped-def]
         seed = job.choices.seed
-        if seed == CRASH:
+        if seed == CRASH:  # amid a file on its way
+            tempfile.mkdtemp(prefix=f"lfd-render-{os.getpid()}-")
             os.kill(os.getpid(), signal.SIGSEGV)
         elif seed == HANG:
             time.sleep(1000)
