@@ -231,7 +231,7 @@ class _Player:
         finally:
             for task in tasks:
                 task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)  # the first one's error counts
+            await asyncio.wait(tasks)
 
     async def _listen(self) -> None:
         while True:
