@@ -115,9 +115,7 @@ class Keys:
     def _who(self, scope: Scope) -> str:
         headers = Headers(scope=scope)
         if not self._keys:
-            # None: through a socket file. Whom a proxy there speaks for, uvicorn does not tell.
-            client = scope.get("client")
-            if "x-forwarded-for" in headers if client is None else not is_loopback(client[0]):
+            if not _is_here(scope, headers):
                 raise ProblemError(
                     403, "only clients on this machine may use a server without keys; set "
                     "LFD_API_KEYS", "client",
@@ -218,6 +216,15 @@ def _same(given: bytes, keys: Iterable[bytes]) -> int | None:
         if hmac.compare_digest(given, key):
             found = number
     return found
+
+
+def _is_here(scope: Scope, headers: Headers) -> bool:
+    """Whether a client is on this machine: by its address, or through a socket file, where whom a
+    proxy speaks for only its header tells. One that has gone already has no address either."""
+    client, (_, port) = scope.get("client"), scope.get("server") or ("", 0)
+    if client is None:
+        return port is None and "x-forwarded-for" not in headers
+    return is_loopback(client[0])
 
 
 def is_loopback(address: str) -> bool:

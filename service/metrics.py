@@ -67,7 +67,9 @@ class _PoolCollector:
         yield GaugeMetricFamily("lfd_queue_depth", "Pictures that wait.", pool.queued)
         yield GaugeMetricFamily("lfd_running", "Pictures being made.", pool.running)
         yield GaugeMetricFamily("lfd_processes_ready", "Render processes ready.", pool.ready)
-        yield GaugeMetricFamily("lfd_blocked_scenes", "Scenes refused.", len(pool.blocked))
+        yield GaugeMetricFamily(
+            "lfd_blocked_scenes", "Scenes and orders refused.", len(pool.blocked)
+        )
         renderers = GaugeMetricFamily("lfd_gl_renderer", "Processes by renderer.", labels=["name"])
         for name in sorted(set(pool.renderers)):
             renderers.add_metric([name], pool.renderers.count(name))

@@ -405,7 +405,10 @@ class Pool:
         elif scene and self._died(blamed) >= _MOST_DEATHS:
             self._fail(
                 ticket,
-                PoisonError(f"{scene.name}: rendering it ends the process; give another scene"),
+                PoisonError(
+                    f"{scene.name}: rendering it so ends the process; give other options or "
+                    "another scene"
+                ),
             )
         elif not ticket.answer.done():
             ticket.yields = False

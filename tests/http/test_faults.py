@@ -116,7 +116,7 @@ def test_killed_processes_lose_no_request(
 def test_a_scene_that_crashes_is_refused(server: Server, client: httpx.Client) -> None:
     pids = server.render_pids()
     before = metric(client, "lfd_process_restarts_total")
-    assert "ends the process" in problem(eia(client, scene(1), seed=CRASH), 422)["detail"]
+    assert "so ends the process" in problem(eia(client, scene(1), seed=CRASH), 422)["detail"]
     assert metric(client, "lfd_process_restarts_total") - before == 2
     ended = set(pids) - set(server.render_pids())
     temporary = Path(tempfile.gettempdir())

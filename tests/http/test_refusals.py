@@ -342,7 +342,11 @@ def test_keys_are_asked_for(guarded: Server) -> None:
         assert all(KEY not in line for line in guarded.log)
 
 
-def statuses_of(settings: Settings, clients: list[tuple[str | None, str | None]]) -> list[int]:
+def statuses_of(
+    settings: Settings,
+    clients: list[tuple[str | None, str | None]],
+    server: tuple[str, int | None] = ("127.0.0.1", 8000),
+) -> list[int]:
     """What clients of these addresses are answered, each with what a proxy says of it."""
     statuses: list[int] = []
     keys = Keys(_answers, settings)
@@ -357,6 +361,7 @@ def statuses_of(settings: Settings, clients: list[tuple[str | None, str | None]]
         headers = [(b"x-forwarded-for", told.encode())] if told else []
         scope: Scope = {"type": "http", "path": "/v1/displays", "headers": headers}
         scope["client"] = address and (address, 9)
+        scope["server"] = server
         asyncio.run(keys(scope, receive, send))
     return statuses
 
@@ -372,8 +377,10 @@ def test_strangers_need_a_key() -> None:
 
 
 def test_a_socket_file_is_this_machines() -> None:
-    """But for whom a proxy speaks there."""
-    assert statuses_of(Settings(), [(None, None), (None, "192.0.2.7")]) == [200, 403]
+    """But for whom a proxy speaks there; and a stranger who has gone has no address either."""
+    clients = [(None, None), (None, "192.0.2.7")]
+    assert statuses_of(Settings(), clients, ("/run/lfd.sock", None)) == [200, 403]
+    assert statuses_of(Settings(), clients) == [403, 403]
 
 
 def test_addresses_of_this_machine_share_a_rate() -> None:
