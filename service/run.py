@@ -82,7 +82,11 @@ def _listening(settings: Settings) -> socket.socket:
         raise OutputError(
             f"--port: {settings.host}:{settings.port}: {error.strerror}; choose another"
         ) from error
-    # Connections inherit it. Closing one politely waits for a client to take what was sent; one
+    # Connections inherit these. asyncio asks for the first itself, but not where a socket names no
+    # protocol, as this one's do; without it an answer's second packet, its body, waits some 40 ms
+    # for the client's kernel to acknowledge the first.
+    made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    # Closing one politely waits for a client to take what was sent; one
     # that never does would keep it for good.
     made.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1000 * settings.idle_s))
     return made

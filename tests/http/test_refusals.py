@@ -3,6 +3,7 @@
 import asyncio
 import io
 import json
+import socket
 import struct
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from typing import Any
 import httpx
 import pytest
 from lfd_render.service.guards import Keys
+from lfd_render.service.run import _listening
 from lfd_render.service.settings import Settings
 from starlette.types import Message, Receive, Scope, Send
 
@@ -452,6 +454,16 @@ def test_a_server_that_cannot_start_says_why(
     assert done.returncode == code
     assert words in done.stderr.splitlines()[-1]
     assert "Traceback" not in done.stderr
+
+
+def test_answers_wait_for_no_acknowledgement() -> None:
+    """Of a first packet, for which a client's kernel takes its time, before the second goes."""
+    with (
+        _listening(Settings(port=0)) as listener,
+        socket.create_connection(listener.getsockname()),
+        listener.accept()[0] as connection,
+    ):
+        assert connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
 
 
 def test_what_is_described_is_there(client: httpx.Client) -> None:
