@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,16 +11,10 @@ from lfd_render.gpu.device import Device
 from lfd_render.techniques.mvr import VARIANTS, notation, problem
 
 ALL_MVR = "mvr:all"
-# Of the catalogue what its authors recommend, and the plain one, each with both kinds of shading.
-USUAL = (
-    "lfdpr",
-    "lfdpr:paper",
-    "mvr:multipass",
-    "mvr:multipass-deferred",
-    "mvr:instanced-4-deferred",
-    "mvr:invocations-4-deferred",
-    "mvr:multiview-4-deferred",
-)
+BEST_MVR = "mvr:best"  # the fastest of the scene's ranking, at most BEST_COUNT of them
+PLAIN_MVR = "mvr:multipass"
+BEST_COUNT, _CLOSE = 2, 1.25  # how much slower than the fastest one may be and still become it
+USUAL = ("lfdpr", "lfdpr:paper", PLAIN_MVR, BEST_MVR)
 _PRESETS = ("default", "paper")
 
 
@@ -65,7 +59,9 @@ def techniques(names: Sequence[str]) -> tuple[str, ...]:
     found: dict[str, None] = {}
     for name in names:
         kind, _, detail = name.partition(":")
-        if name == ALL_MVR:
+        if name == BEST_MVR:
+            found[name] = None
+        elif name == ALL_MVR:
             found |= dict.fromkeys(f"mvr:{variant}" for variant in VARIANTS)
         elif kind == "mvr" and (not detail or detail in VARIANTS):
             found[f"mvr:{detail or 'multipass'}"] = None
@@ -73,7 +69,20 @@ def techniques(names: Sequence[str]) -> tuple[str, ...]:
             found["lfdpr" if detail in ("", "default") else name] = None
         else:
             raise UsageError(
-                f"technique '{name}': unknown; use lfdpr, lfdpr:paper, {ALL_MVR} or "
-                f"mvr:VARIANT of {', '.join(VARIANTS)}"
+                f"technique '{name}': unknown; use lfdpr, lfdpr:paper, {BEST_MVR}, {ALL_MVR} "
+                f"or mvr:VARIANT of {', '.join(VARIANTS)}"
             )
     return tuple(found)
+
+
+def fastest(device: Device, times_ms: Mapping[str, float], eyes: int) -> tuple[str, ...]:
+    """Of ranked techniques those that may be the best with so many eyes, fastest first: who is
+    much slower than the first cannot become it."""
+    able = {
+        name: ms
+        for name, ms in sorted(times_ms.items(), key=lambda item: item[1])
+        if Contender(name).problem(device, eyes) is None
+    }
+    least = min(able.values(), default=0.0)
+    close = [name for name, ms in able.items() if ms <= _CLOSE * least]
+    return tuple(close[:BEST_COUNT]) or (f"{PLAIN_MVR}-deferred",)

@@ -1,12 +1,13 @@
 """Times contenders in turn on the same moving scene, each with its own stage on one device.
 
-What else a machine does falls on all of them alike, so ratios within a group are what counts. A
-picture is judged (`bench.check`) before it is timed, after a frame from elsewhere, so that nothing
-left from before can pass.
+What else a machine does falls on all of them alike, so ratios within a group are what counts. The
+first frame that is timed is also judged (`bench.check`), after a frame from elsewhere, so that
+nothing left from before can pass; the times of a wrong picture are thrown away.
 """
 
 from __future__ import annotations
 
+import math
 import statistics
 import time
 from collections.abc import Callable, Iterator
@@ -34,6 +35,7 @@ from lfd_render.scene import Scene
 Pixels = NDArray[np.uint8]
 Told = Callable[[str], None]
 _ELSEWHERE_RAD = 0.35  # how far the frame before the one that is judged is turned away
+_HOPELESS = 2.0  # times as slow as the fastest of a ranking so far
 _MOST_MISSED = 0.05  # of what a standard shows; its edges are finer than a rival's
 _PANEL_STAGES = ("average", "encode_srgb", "weave")
 _POINT_STAGES = ("transform", "sample")
@@ -41,26 +43,35 @@ _POINT_STAGES = ("transform", "sample")
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is done. rounds: counted frames of each contender; compared: views of the standard,
-    with samples × samples a pixel; gold_size: pixels of the panel image's standard's views, None:
-    none is made."""
+    """How much is done. A contender gets as many counted frames as take `row_s` seconds, but from
+    `least` to `rounds` of them, after a frame from elsewhere; in the ranking one. compared: views
+    of the standard, with samples × samples a pixel; gold_size: pixels of the panel image's
+    standard's views, None: none is made."""
 
     rounds: int = 15
-    warm_ups: int = 5
+    least: int = 3
+    row_s: float = 6.0
     compared: int = 3
     samples: int = 8
     gold_views: int = 96
     gold_size: tuple[int, int] | None = (960, 540)
 
+    def frames(self, ms: float, ranks: bool = False) -> int:
+        """Counted frames of a contender whose frame takes so long."""
+        least = min(self.least, self.rounds)
+        wanted = int(1000.0 * self.row_s / max(ms, 1e-3))
+        return 1 if ranks else max(least, min(wanted, self.rounds))
+
 
 @dataclass
 class Row:
-    """What one contender did in a group. gap: why there is nothing, or None; fault: what is wrong
-    with its picture. Times in ms, memory in bytes; eia: against the panel image's standard, view:
-    against single views' as an eye sees them, RMSE in levels of 255."""
+    """What one contender did in a group. suites: that show it; gap: why there is nothing, or None;
+    fault: what is wrong with its picture. Times in ms, cpu: the processor time of this process;
+    memory in bytes; eia: against the panel image's standard, view: against single views' as an eye
+    sees them, RMSE in levels of 255."""
 
     group: str
-    suite: str
+    suites: tuple[str, ...]
     scene: str
     triangles: int
     views: int
@@ -72,6 +83,7 @@ class Row:
     gap: str | None = None
     fault: str | None = None
     frames_ms: list[float] = field(default_factory=list)
+    cpu_ms: list[float] = field(default_factory=list)
     stages_ms: dict[str, float] = field(default_factory=dict)
     leaves_out: str = ""
     compile_ms: float = 0.0
@@ -98,6 +110,11 @@ class Row:
     def median_ms(self) -> float:
         """Of the counted frames."""
         return statistics.median(self.frames_ms)
+
+    @property
+    def median_cpu_ms(self) -> float:
+        """Of the counted frames' processor time, 0 where it is not known."""
+        return statistics.median(self.cpu_ms) if self.cpu_ms else 0.0
 
     @property
     def spread(self) -> float:
@@ -140,13 +157,15 @@ class Frames(Protocol):
 
 @dataclass
 class _Running:
-    """A contender at work; without verdict and panel image where it is a rival from outside."""
+    """A contender at work, for so many counted frames; without verdict where it is a rival from
+    outside."""
 
     row: Row
     renderer: Renderer
     stage: Frames
+    warm_ms: float  # of the frame before those that count
+    rounds: int = 1
     verdict: Verdict | None = None
-    eia: Pixels | None = None
 
 
 class Bench:
@@ -161,7 +180,7 @@ class Bench:
         """told: what is being done now, in a few words."""
         self._device, self._display, self._effort, self._told = device, display, effort, told
         self._scene: tuple[str, Scene] | None = None
-        self._standards: dict[tuple[str, int, tuple[int, int] | None], Standard] = {}
+        self._standards: dict[tuple[str, int, tuple[int, int]], Standard] = {}
         self._gold: dict[str, Pixels] = {}
 
     def rows(self, group: Group) -> list[Row]:
@@ -172,25 +191,36 @@ class Bench:
         camera = camera_for(scene, self._display)
         standard = self._standard(group, scene, camera)
         gold = self._gold_eia(group, scene, camera)
-        rows = [self._row(group, scene, contender) for contender in group.contenders]
+        rows: list[Row] = []
         running: list[_Running] = []
         try:
-            for row, contender in zip(rows, group.contenders, strict=True):
+            for contender, suites in group.contenders.items():
+                row = self._row(group, scene, contender, suites)
+                rows.append(row)
                 self._told(f"{group.scene}: preparing {row.contender}")
                 start = self._start_outside if contender.technique in RIVALS else self._start
                 found = start(group, row, contender, scene=scene, camera=camera, standard=standard)
-                if found is not None:
-                    running.append(found)
-            _judge_together(running)
+                if found is None:
+                    continue
+                running.append(found)
+                if group.ranks:  # one at a time: the whole catalogue at once takes much memory
+                    least = min((r.median_ms for r in rows if r.frames_ms), default=math.inf)
+                    if found.warm_ms > _HOPELESS * least:
+                        row.gap = "more than twice as slow as the fastest, so not timed further"
+                    else:
+                        self._first(group, found, camera, standard, None)
+                    _close(found)
+            if group.ranks:
+                _judge_together(running)
+                return rows
             for found in running:
-                if gold is not None and found.eia is not None:
-                    found.row.eia_rmse = rmse(gold, found.eia)
-                    found.row.eia_ssim = ssim_luma(gold, found.eia)
+                self._told(f"{group.scene}: judging {found.row.contender}")
+                self._first(group, found, camera, standard, gold)
+            _judge_together(running)
             self._run(group, [found for found in running if not found.row.fault], camera)
         finally:
             for found in running:
-                found.stage.close()
-                found.renderer.close()
+                _close(found)
         return rows
 
     def _load(self, source: str) -> Scene:
@@ -201,7 +231,8 @@ class Bench:
         return self._scene[1]
 
     def _standard(self, group: Group, scene: Scene, camera: Camera) -> Standard:
-        key = (group.scene, group.views, group.view_size)
+        size = group.view_size or upright_size(self._display, group.views)
+        key = (group.scene, group.views, size)
         if key not in self._standards:
             self._told(f"{group.scene}: standard of single views")
             rig = self._display.rig(group.views)
@@ -212,7 +243,7 @@ class Bench:
                 pictures = tuple(
                     gold_standard(
                         judge, scene, self._display, camera, eye=alone(rig, view),
-                        view_size=group.view_size or upright_size(self._display, group.views),
+                        view_size=size,
                         samples=self._effort.samples,
                     )
                     for view in views
@@ -223,7 +254,7 @@ class Bench:
     def _gold_eia(self, group: Group, scene: Scene, camera: Camera) -> Pixels | None:
         """The panel image's standard for the suites that tell of it."""
         size = self._effort.gold_size
-        if size is None or group.suite not in ("aa", "supersample"):
+        if size is None or not group.suites & {"aa", "supersample", "error"}:
             return None
         if group.scene not in self._gold:
             self._told(f"{group.scene}: standard of the panel image")
@@ -235,9 +266,11 @@ class Bench:
             self._gold[group.scene] = eia.pixels
         return self._gold[group.scene]
 
-    def _row(self, group: Group, scene: Scene, contender: Contender) -> Row:
+    def _row(
+        self, group: Group, scene: Scene, contender: Contender, suites: tuple[str, ...]
+    ) -> Row:
         return Row(
-            group=group.key, suite=group.suite, scene=group.scene, triangles=scene.triangle_count,
+            group=group.key, suites=suites, scene=group.scene, triangles=scene.triangle_count,
             views=group.views, supersample=group.supersample, contender=contender.name,
             technique=contender.technique, aa=contender.aa, notation=contender.notation,
         )  # fmt: skip
@@ -252,9 +285,9 @@ class Bench:
         camera: Camera,
         standard: Standard,
     ) -> _Running | None:
-        """Stage one contender and judge its picture; None where it cannot, as its row then says."""
-        eyes = group.views * group.supersample[1]
-        row.gap = contender.problem(self._device, eyes)
+        """Stage one contender and render a frame from elsewhere; None where it cannot, as its row
+        then says."""
+        row.gap = contender.problem(self._device, group.eyes)
         if row.gap:
             return None
         ledger = self._device.ledger
@@ -268,14 +301,9 @@ class Bench:
             )  # fmt: skip
             row.compile_ms = 1000 * (time.perf_counter() - begun)
             peak = ledger.peak
-            stage.frame(camera.turned(_ELSEWHERE_RAD))
-            peak = max(peak, ledger.peak)
-            eia: Eia = stage.render(camera)
+            ms = stage.frame(camera.turned(_ELSEWHERE_RAD))
             row.device_bytes = max(peak, ledger.peak) - before
-            row.points = eia.report["points"] or 0
-            row.view_size = (eia.report["view_size"][0], eia.report["view_size"][1])
-            found = verdict(eia.pixels, self._display, self._display.rig(group.views), standard)
-            return _Running(row, renderer, stage, found, eia.pixels)
+            return _Running(row, renderer, stage, ms)
         renderer.close()
         return None
 
@@ -296,7 +324,7 @@ class Bench:
             outside = Outside(contender.technique, scene, self._display, group.views, size)
             row.compile_ms = 1000 * (time.perf_counter() - begun)
             row.leaves_out, row.view_size = outside.leaves_out, size
-            outside.frame(camera)
+            ms = outside.frame(camera)
             assert outside.shown is not None
             missed = [
                 float(np.mean(~outside.shown[view][picture.max(axis=-1) > LEAST_SEEN]))
@@ -304,30 +332,70 @@ class Bench:
             ]
             if max(missed) > _MOST_MISSED:
                 row.fault = f"misses {100 * max(missed):.0f} % of what the standard shows"
-            return _Running(row, Renderer(self._device), outside)
+            return _Running(row, Renderer(self._device), outside, ms)
         return None
 
+    def _first(
+        self,
+        group: Group,
+        found: _Running,
+        camera: Camera,
+        standard: Standard,
+        gold: Pixels | None,
+    ) -> None:
+        """The first counted frame, read and judged."""
+        row = found.row
+        with _naming_gaps(row):
+            _count(found, camera)
+            found.rounds = self._effort.frames(row.frames_ms[0], group.ranks)
+            if not isinstance(found.stage, Stage):
+                return
+            eia: Eia = found.stage.read()
+            row.points = eia.report["points"] or 0
+            row.view_size = (eia.report["view_size"][0], eia.report["view_size"][1])
+            found.verdict = verdict(
+                eia.pixels, self._display, self._display.rig(group.views), standard
+            )
+            row.stages_ms = _stages(eia.report["timings_ms"])
+            if gold is not None:
+                row.eia_rmse, row.eia_ssim = rmse(gold, eia.pixels), ssim_luma(gold, eia.pixels)
+
     def _run(self, group: Group, running: list[_Running], camera: Camera) -> None:
-        """A B A B: frame by frame, all contenders by the same camera."""
-        count = self._effort.warm_ups + self._effort.rounds
+        """A B A B: as many rounds as the slowest has frames, all contenders in each, those that
+        have more frames several at once. The first frame is counted already."""
+        count = min((found.rounds for found in running), default=0)
         for index in range(count):
-            self._told(f"{group.scene}, {group.views} views: frame {index + 1} of {count}")
-            at = camera.turned(float(REPEAT_TURN_RAD) * (index - count // 2))
+            self._told(f"{group.scene}, {group.views} views: round {index + 1} of {count}")
             for found in running:
-                if found.row.gap:
-                    continue
-                with _naming_gaps(found.row):
-                    ms = found.stage.frame(at)
-                    if index >= self._effort.warm_ups:
-                        found.row.frames_ms.append(round(ms, 3))
+                done, end = (found.rounds * (index + n) // count for n in (0, 1))
+                for frame in range(max(done, 1), end):
+                    turn = index + (frame - done) / (end - done)
+                    if found.row.gap is None:
+                        with _naming_gaps(found.row):
+                            _count(found, camera.turned(float(REPEAT_TURN_RAD) * turn))
         for found in running:
             with _naming_gaps(found.row):
-                if found.row.gap is None and isinstance(found.stage, Stage):
-                    timings = found.stage.read().report["timings_ms"]
-                    done_once = ("frame", "read", "upload", "compile", "prefilter")
-                    found.row.stages_ms = {
-                        name: ms for name, ms in timings.items() if name not in done_once
-                    }
+                if found.row.gap is None and found.rounds > 1 and isinstance(found.stage, Stage):
+                    found.row.stages_ms = _stages(found.stage.read().report["timings_ms"])
+
+
+def _count(found: _Running, camera: Camera) -> None:
+    """One counted frame."""
+    begun = time.process_time()
+    ms = found.stage.frame(camera)
+    if isinstance(found.stage, Stage):  # others work in other processes
+        found.row.cpu_ms.append(round(1000 * (time.process_time() - begun), 3))
+    found.row.frames_ms.append(round(ms, 3))
+
+
+def _close(found: _Running) -> None:
+    found.stage.close()
+    found.renderer.close()
+
+
+def _stages(timings: dict[str, float]) -> dict[str, float]:
+    done_once = ("frame", "read", "upload", "compile", "prefilter")
+    return {name: ms for name, ms in timings.items() if name not in done_once}
 
 
 def _judge_together(running: list[_Running]) -> None:
@@ -340,18 +408,20 @@ def _judge_together(running: list[_Running]) -> None:
         row = found.row
         row.fault, row.view_rmse, row.view_ssim = final.fault, final.rmse, final.ssim
         row.detail = final.detail
+        if row.fault:
+            row.frames_ms, row.cpu_ms, row.stages_ms = [], [], {}
 
 
 def unmeasured(group: Group, error: LfdError | MemoryError) -> list[Row]:
     """Rows of a group that nobody could do."""
     return [
         Row(
-            group=group.key, suite=group.suite, scene=group.scene, triangles=0, views=group.views,
+            group=group.key, suites=suites, scene=group.scene, triangles=0, views=group.views,
             supersample=group.supersample, contender=contender.name,
             technique=contender.technique, aa=contender.aa, notation=contender.notation,
             gap=str(error) or type(error).__name__,
         )
-        for contender in group.contenders
+        for contender, suites in group.contenders.items()
     ]  # fmt: skip
 
 

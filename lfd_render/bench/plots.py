@@ -18,10 +18,10 @@ def write_plots(folder: Path, rows: Sequence[Row]) -> list[Path]:
     """One SVG a suite that has a plot. Raises UsageError without matplotlib, OutputError."""
     written = []
     for suite, (x, y, labels) in _PLOTS.items():
-        found = [row for row in rows if row.suite == suite and row.valid]
+        found = [row for row in rows if suite in row.suites and row.valid]
         if found:
             path = folder / f"{suite}.svg"
-            _write(path, found, x, y, labels)
+            _write(path, found, x, y, labels, panel=_PANELS.get(suite, scene_name))
             written.append(path)
     return written
 
@@ -32,21 +32,21 @@ def _write(
     x: Callable[[Row], float],
     y: Callable[[Row], float],
     labels: tuple[str, str],
+    *,
+    panel: Callable[[Row], str],
 ) -> None:
     try:
         from matplotlib.figure import Figure  # noqa: PLC0415 - an optional extra
     except ImportError as cause:
         raise UsageError("plots need matplotlib; install lfd-render[bench]") from cause
-    scenes = list(dict.fromkeys(_panel_of(row) for row in rows))
+    scenes = list(dict.fromkeys(panel(row) for row in rows))
     names = list(dict.fromkeys(row.contender for row in rows))
     figure = Figure(figsize=(4.2 * len(scenes), 4.4), layout="constrained")
     all_axes: Any = figure.subplots(1, len(scenes), squeeze=False)[0]
     for axes, scene in zip(all_axes, scenes, strict=True):
         for index, name in enumerate(names):
             points = sorted(
-                (x(row), y(row))
-                for row in rows
-                if row.contender == name and _panel_of(row) == scene
+                (x(row), y(row)) for row in rows if row.contender == name and panel(row) == scene
             )
             if points:
                 axes.plot(
@@ -64,9 +64,8 @@ def _write(
         figure.savefig(temporary, format="svg")
 
 
-def _panel_of(row: Row) -> str:
-    name = row.scene.partition("?")[0].removeprefix("builtin:")
-    return name if row.suite == "triangles" else scene_name(row)
+def _family(row: Row) -> str:
+    return row.scene.partition("?")[0].removeprefix("builtin:")
 
 
 def _legend(all_axes: Sequence[Any]) -> tuple[list[Any], list[str]]:
@@ -82,12 +81,13 @@ def _seconds(row: Row) -> float:
     return row.median_ms / 1000
 
 
+_PANELS = {"triangles": _family}
 _PLOTS: dict[str, tuple[Callable[[Row], float], Callable[[Row], float], tuple[str, str]]] = {
     "triangles": (lambda row: row.triangles, _seconds, ("triangles", "seconds a frame")),
     "views": (lambda row: row.views, _seconds, ("views", "seconds a frame")),
     "error": (
         _seconds,
-        lambda row: row.view_rmse or 0.0,
-        ("seconds a frame", "RMSE of single views, levels of 255"),
+        lambda row: row.eia_rmse or row.view_rmse or 0.0,
+        ("seconds a frame", "RMSE of the panel image, levels of 255"),
     ),
 }

@@ -13,7 +13,7 @@ from lfd_render.bench.measure import Row
 from lfd_render.display.files import replacing
 from lfd_render.errors import OutputError, UsageError
 
-SCHEMA = "lfd-bench/1"
+SCHEMA = "lfd-bench/2"
 LINES = "results.jsonl"
 _MAY_DIFFER = ("machine.date", "machine.commit", "machine.python")  # from one sitting to the next
 
@@ -44,25 +44,11 @@ class Results:
             self._append({"schema": SCHEMA, "settings": self.settings})
             return
         self._check(lines[0])
-        for number, line in enumerate(lines[1:], 2):
-            try:
-                rows = [row_from_json(data) for data in json.loads(line)["rows"]]
-                self.groups[rows[0].group] = rows
-            except (ValueError, TypeError, KeyError, IndexError) as error:
-                raise OutputError(
-                    f"{self.path}: line {number} is no group of rows ({error}); remove it, or use "
-                    "another folder"
-                ) from error
+        self.groups = _groups(self.path, lines[1:])
         self._rewrite("".join(lines))
 
     def _check(self, line: str) -> None:
-        try:
-            head = json.loads(line)
-            schema, found = head["schema"], dict(head["settings"])
-        except (ValueError, TypeError, KeyError) as error:
-            raise OutputError(f"{self.path}: line 1 has no settings; use another folder") from error
-        if schema != SCHEMA:
-            raise OutputError(f"{self.path}: schema {schema!r}, not {SCHEMA!r}; use another folder")
+        found = _settings(self.path, line)
         now_all, before_all = _flat(self.settings), _flat(found)
         for name in sorted(now_all.keys() | before_all.keys()):
             now, before = now_all.get(name), before_all.get(name)
@@ -77,6 +63,10 @@ class Results:
         """One more group, on the disk when this returns."""
         self.groups[rows[0].group] = list(rows)
         self._append({"rows": [dataclasses.asdict(row) for row in rows]})
+
+    def done(self, key: str) -> bool:
+        """Whether a group is measured; one in which nobody could do anything is tried again."""
+        return any(row.valid or row.fault for row in self.groups.get(key, []))
 
     @property
     def rows(self) -> list[Row]:
@@ -97,6 +87,45 @@ class Results:
             raise OutputError(f"{self.path}: {error.strerror}; use another folder") from error
 
 
+def read_groups(folder: Path) -> dict[str, list[Row]]:
+    """The groups of a run, whole ones only. Raises OutputError where there are none."""
+    path = folder / LINES
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    except (OSError, UnicodeDecodeError) as error:
+        raise OutputError(f"{path}: cannot be read ({error}); name a folder of a run") from error
+    if not lines:
+        raise OutputError(f"{path}: is empty; name a folder of a run")
+    _settings(path, lines[0])
+    return _groups(path, [line for line in lines[1:] if line.endswith("\n")])
+
+
+def _settings(path: Path, line: str) -> dict[str, Any]:
+    try:
+        head = json.loads(line)
+        schema, found = head["schema"], dict(head["settings"])
+    except (ValueError, TypeError, KeyError) as error:
+        raise OutputError(f"{path}: line 1 has no settings; use another folder") from error
+    if schema != SCHEMA:
+        raise OutputError(f"{path}: schema {schema!r}, not {SCHEMA!r}; use another folder")
+    return found
+
+
+def _groups(path: Path, lines: Sequence[str]) -> dict[str, list[Row]]:
+    """Of the lines after the first; of a group's lines the last."""
+    groups: dict[str, list[Row]] = {}
+    for number, line in enumerate(lines, 2):
+        try:
+            rows = [row_from_json(data) for data in json.loads(line)["rows"]]
+            groups[rows[0].group] = rows
+        except (ValueError, TypeError, KeyError, IndexError) as error:
+            raise OutputError(
+                f"{path}: line {number} is no group of rows ({error}); remove it, or use "
+                "another folder"
+            ) from error
+    return groups
+
+
 def _flat(settings: Mapping[str, Any], before: str = "") -> dict[str, Any]:
     """Settings of settings under names with dots."""
     found: dict[str, Any] = {}
@@ -111,6 +140,7 @@ def _flat(settings: Mapping[str, Any], before: str = "") -> dict[str, Any]:
 def row_from_json(data: Mapping[str, Any]) -> Row:
     """A row as `dataclasses.asdict` made it. Raises TypeError or KeyError for other data."""
     row = Row(**data)
+    row.suites = tuple(row.suites)
     row.supersample = (int(row.supersample[0]), int(row.supersample[1]))
     row.view_size = (int(row.view_size[0]), int(row.view_size[1]))
     return row

@@ -2,15 +2,17 @@
 
 A suite is one table or plot: the paper's Tables 1 (`aa`) and 2 (`supersample`), time against
 triangles and against views, speed against error as in EPR's Fig. 6, and all rasterisers (`mvr`).
+Work that several suites show is done once, for all of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
-from lfd_render.bench.contenders import Contender
+from lfd_render.bench.contenders import ALL_MVR, BEST_MVR, PLAIN_MVR, Contender, techniques
 from lfd_render.errors import UsageError
+from lfd_render.scene.builtin import BUILTINS, PREFIX
 
 # The paper's scenes and those of their kinds that the project makes.
 SCENES = {
@@ -19,19 +21,20 @@ SCENES = {
     "Coconut": "builtin:coconuts",
     "Car": "builtin:car",
 }
+RANKING = "mvr"
 FILTERS = ("none", "spatial", "angular", "both")
 
 
 @dataclass(frozen=True)
 class Group:
     """The same work for several contenders: a scene, so many views, samples a view pixel each way
-    and eyes a view; view_size None: as the display has it."""
+    and eyes a view; view_size None: as the display has it. contenders: each with the suites that
+    show it."""
 
-    suite: str
     scene: str
     views: int
     supersample: tuple[int, int]
-    contenders: tuple[Contender, ...]
+    contenders: Mapping[Contender, tuple[str, ...]]
     view_size: tuple[int, int] | None = None
 
     @property
@@ -39,26 +42,53 @@ class Group:
         """What tells it from all other groups of a run but the contenders."""
         size = "x".join(map(str, self.view_size)) if self.view_size else "default"
         samples = "x".join(map(str, self.supersample))
-        return f"{self.suite} {self.scene} {self.views} {samples} {size}"
+        return f"{self.scene} {self.views} {samples} {size}"
+
+    @property
+    def suites(self) -> set[str]:
+        """All that show some of it."""
+        return {suite for suites in self.contenders.values() for suite in suites}
+
+    @property
+    def eyes(self) -> int:
+        """That a frame is seen from."""
+        return self.views * self.supersample[1]
+
+    @property
+    def ranks(self) -> bool:
+        """Whether it only tells which rasterisers others are measured against."""
+        return self.suites == {RANKING}
+
+    def with_best(self, best: Sequence[str]) -> Group:
+        """With these in place of `mvr:best`; what is named twice is shown by both's suites."""
+        found: dict[Contender, tuple[str, ...]] = {}
+        for contender, suites in self.contenders.items():
+            names = best if contender.technique == BEST_MVR else (contender.technique,)
+            for name in names:
+                chosen = replace(contender, technique=name)
+                found[chosen] = tuple(dict.fromkeys((*found.get(chosen, ()), *suites)))
+        return replace(self, contenders=found)
 
 
 @dataclass(frozen=True)
 class Axes:
-    """What is swept. triangles: of built-in scenes, 0 for their own number."""
+    """What is swept. triangles: of built-in scenes, besides their own number; views: besides
+    main_views; sizes: of views, times the main one."""
 
     scenes: tuple[str, ...] = tuple(SCENES.values())
     techniques: tuple[str, ...] = ()
     aa: tuple[str, ...] = FILTERS
     supersample: tuple[tuple[int, int], ...] = ((2, 1), (1, 2))
-    views: tuple[int, ...] = (24, 48, 96)
-    triangles: tuple[int, ...] = (100_000, 300_000, 1_000_000, 3_000_000)
-    view_sizes: tuple[tuple[int, int], ...] = field(
-        default=((240, 180), (360, 270), (480, 360), (720, 540))
-    )
+    views: tuple[int, ...] = (24, 96)
+    triangles: tuple[int, ...] = (100_000, 300_000, 1_000_000)
+    sizes: tuple[float, ...] = (0.5,)
     extra: str = ""  # options of built-in scenes, as textures=512
     main_views: int = 48
     main_triangles: int = 0
     main_size: tuple[int, int] | None = None
+    usual_size: tuple[int, int] = (480, 360)  # of main_views upright views, where none is given
+    ranked_views: int = 8
+    buffer_views: tuple[int, ...] = (4, 16, 32)
     rivals: tuple[str, ...] = ()
 
 
@@ -68,6 +98,8 @@ def scene_source(scene: str, triangles: int, extra: str = "") -> str:
         return scene
     name, _, query = scene.partition("?")
     items = [item for item in query.split("&") if item]
+    if triangles == _own_triangles(name):
+        triangles = 0
     if triangles and not any(item.startswith("triangles=") for item in items):
         items.append(f"triangles={triangles}")
     given = {item.partition("=")[0] for item in items}
@@ -77,26 +109,50 @@ def scene_source(scene: str, triangles: int, extra: str = "") -> str:
     return name + ("?" + "&".join(items) if items else "")
 
 
+def _own_triangles(name: str) -> int | None:
+    builtin = BUILTINS.get(name.removeprefix(PREFIX))
+    return builtin.defaults["triangles"] if builtin else None
+
+
 def _main(axes: Axes, scene: str) -> str:
     return scene_source(scene, axes.main_triangles, axes.extra)
+
+
+def _group(
+    axes: Axes,
+    suite: str,
+    scene: str,
+    contenders: Sequence[Contender],
+    *,
+    views: int | None = None,
+    supersample: tuple[int, int] = (1, 1),
+    size: tuple[int, int] | None = None,
+) -> Group:
+    shown = dict.fromkeys(contenders, (suite,))
+    return Group(scene, views or axes.main_views, supersample, shown, size or axes.main_size)
 
 
 def _plain(axes: Axes) -> tuple[Contender, ...]:
     return tuple(Contender(name) for name in axes.techniques)
 
 
+def _few(axes: Axes) -> tuple[Contender, ...]:
+    """Where the ranking's best take part: without the paper's preset and plain rasterisation, which
+    other tables show to be slower."""
+    left_out = (PLAIN_MVR, "lfdpr:paper") if BEST_MVR in axes.techniques else ()
+    return tuple(c for c in _plain(axes) if c.technique not in left_out)
+
+
 def _filtered(axes: Axes) -> list[Group]:
-    """Table 1: each technique, LFDPR with each filter, as the paper has it."""
+    """Table 1: each technique, LFDPR with each filter, as the paper has it; its slow preset with
+    none and the last, for only the panel image takes longer."""
     contenders = tuple(
         Contender(name, aa)
         for name in axes.techniques
         for aa in axes.aa
-        if aa == "none" or not name.startswith("mvr")
+        if aa == "none" or name == "lfdpr" or (name == "lfdpr:paper" and aa == axes.aa[-1])
     )
-    return [
-        Group("aa", _main(axes, s), axes.main_views, (1, 1), contenders, axes.main_size)
-        for s in axes.scenes
-    ]
+    return [_group(axes, "aa", _main(axes, s), contenders) for s in axes.scenes]
 
 
 def _supersampled(axes: Axes) -> list[Group]:
@@ -108,73 +164,108 @@ def _supersampled(axes: Axes) -> list[Group]:
             contenders = tuple(
                 Contender(name, "none" if name.startswith("mvr") else filter_)
                 for name in axes.techniques
+                if name != PLAIN_MVR or BEST_MVR not in axes.techniques
             )
-            work = (_main(axes, scene), axes.main_views, (fine, eyes))
-            groups.append(Group("supersample", *work, contenders, axes.main_size))
+            groups.append(
+                _group(
+                    axes, "supersample", _main(axes, scene), contenders, supersample=(fine, eyes)
+                )
+            )
     return groups
 
 
 def _triangles(axes: Axes) -> list[Group]:
-    work = (axes.main_views, (1, 1), _plain(axes), axes.main_size)
+    contenders = tuple(c for c in _plain(axes) if c in _few(axes) or c.rasterises)
     return [
-        Group("triangles", scene_source(s, n, axes.extra), *work)
+        _group(axes, "triangles", scene_source(s, n, axes.extra), contenders)
         for s in axes.scenes
-        for n in axes.triangles
-        if s.startswith("builtin:")
+        for n in (axes.main_triangles, *axes.triangles)
+        if s.startswith(PREFIX)
     ]
 
 
 def _views(axes: Axes) -> list[Group]:
     # All views of one size, whatever their number, as S5 and S12 ask.
-    size = axes.main_size or (480, 360)
     return [
-        Group("views", _main(axes, s), n, (1, 1), _plain(axes), size)
+        _group(
+            axes, "views", _main(axes, s), _few(axes), views=n,
+            size=None if n == axes.main_views else axes.main_size or axes.usual_size,
+        )
         for s in axes.scenes
-        for n in axes.views
-    ]
+        for n in (axes.main_views, *axes.views)
+    ]  # fmt: skip
 
 
 def _error(axes: Axes) -> list[Group]:
-    return [
-        Group("error", _main(axes, s), axes.main_views, (1, 1), _plain(axes), size)
+    """Smaller views, the main ones, and the same with supersamples."""
+    width, height = axes.main_size or axes.usual_size
+    sizes = [(round(width * times), round(height * times)) for times in axes.sizes]
+    sized = [
+        _group(axes, "error", _main(axes, s), _few(axes), size=size)
         for s in axes.scenes
-        for size in axes.view_sizes
+        for size in (axes.main_size, *sizes)
+    ]
+    return sized + [
+        replace(group, contenders=dict.fromkeys(group.contenders, ("error",)))
+        for group in _supersampled(axes)
     ]
 
 
 def _mvr(axes: Axes) -> list[Group]:
-    contenders = tuple(c for c in _plain(axes) if c.rasterises)
+    """The ranking with few views, of the size that all others have: the whole catalogue, or what
+    is asked for of it."""
+    names: Sequence[str] = techniques([ALL_MVR]) if BEST_MVR in axes.techniques else axes.techniques
+    # What shades less comes first, for what is far slower than another is not timed to the end.
+    names = sorted(names, key=lambda name: not name.endswith("-deferred"))
+    contenders = tuple(c for c in map(Contender, names) if c.rasterises)
+    size = axes.main_size or axes.usual_size
     return [
-        Group("mvr", _main(axes, s), n, (1, 1), contenders, axes.main_size or (480, 360))
+        _group(axes, RANKING, _main(axes, s), contenders, views=axes.ranked_views, size=size)
         for s in axes.scenes
-        for n in axes.views
     ]
 
 
 def _rivals(axes: Axes) -> list[Group]:
     """Programs from outside, which render views of one size and weave none."""
-    contenders = (*_plain(axes), *(Contender(name) for name in axes.rivals))
+    contenders = (*_few(axes), *(Contender(name) for name in axes.rivals))
     return [
-        Group("rivals", _main(axes, s), axes.main_views, (1, 1), contenders,
-              axes.main_size or (480, 360))
+        _group(axes, "rivals", _main(axes, s), contenders, size=axes.main_size or axes.usual_size)
         for s in axes.scenes
-    ]  # fmt: skip
+    ]
 
 
 SUITES: dict[str, Callable[[Axes], list[Group]]] = {
+    RANKING: _mvr,
     "aa": _filtered,
     "supersample": _supersampled,
-    "triangles": _triangles,
     "views": _views,
     "error": _error,
-    "mvr": _mvr,
+    "triangles": _triangles,
     "rivals": _rivals,
 }
 
 
 def groups_of(suites: Sequence[str], axes: Axes) -> list[Group]:
-    """All groups in order. Raises UsageError for an unknown suite."""
+    """All groups, those of a scene one after another, its ranking first. What several suites ask
+    for is one group. Raises UsageError for an unknown suite."""
     for name in suites:
         if name not in SUITES:
             raise UsageError(f"suite '{name}': unknown; use {', '.join(SUITES)}")
-    return [group for name in suites for group in SUITES[name](axes) if group.contenders]
+    if BEST_MVR in axes.techniques:
+        suites = (*suites, RANKING)
+    found: dict[str, Group] = {}
+    for name in (name for name in SUITES if name in suites):
+        for group in SUITES[name](axes):
+            known = found.setdefault(group.key, group)
+            shown = dict(known.contenders)
+            for contender, of in group.contenders.items():
+                shown[contender] = tuple(dict.fromkeys((*shown.get(contender, ()), *of)))
+            if shown:
+                found[group.key] = replace(known, contenders=shown)
+    scenes = list(dict.fromkeys(family(s) for s in axes.scenes))
+    return sorted(found.values(), key=lambda group: scenes.index(family(group.scene)))
+
+
+def family(source: str) -> str:
+    """A scene without its options."""
+    return source.partition("?")[0] if source.startswith(PREFIX) else source

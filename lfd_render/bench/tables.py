@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from lfd_render.bench.contenders import PLAIN_MVR
 from lfd_render.bench.measure import Row, best_mvr
 from lfd_render.bench.papers import (
     CATALOGUE,
@@ -16,6 +17,7 @@ from lfd_render.bench.papers import (
 )
 from lfd_render.bench.suites import SCENES
 
+_NOTABLE = 1.1
 _PAPER_NAMES = {source: name for name, source in SCENES.items()}
 
 
@@ -23,7 +25,7 @@ def groups(rows: Sequence[Row], suite: str) -> list[list[Row]]:
     """Rows of one suite, group by group, in order."""
     found: dict[str, list[Row]] = {}
     for row in rows:
-        if row.suite == suite:
+        if suite in row.suites:
             found.setdefault(row.group, []).append(row)
     return list(found.values())
 
@@ -44,11 +46,12 @@ def _head(settings: Mapping[str, Any]) -> str:
     return (
         f"Measured by `lfd-render bench` on {machine['date']}, {built}: {machine['renderer']}, "
         f"{machine['driver']}, {machine['processor']}, {machine['cores']} cores. "
-        f"Medians of {effort['rounds']} frames of a turning scene after {effort['warm_ups']} "
-        "warm-ups, all rows of a group frame by frame in turn; ± half the interquartile range. "
-        "Times are wall clock between finishes. × is the time of the best multi-view rasterisation "
-        "of the group over the row's: more than 1 is faster than it. Every picture was checked "
-        "before it was timed."
+        f"Medians of {min(effort['least'], effort['rounds'])} to {effort['rounds']} frames of a "
+        "turning scene, as many as a row's time allows; all rows of a group in turn; ± half the "
+        "interquartile range. Times are wall clock between finishes. × is the time of the best "
+        "multi-view rasterisation of the group over the row's: more than 1 is faster than it; by "
+        "processor time it follows in brackets where that differs by a tenth. One of the frames "
+        "timed is the picture that was checked."
     )
 
 
@@ -70,8 +73,15 @@ def _count(number: int) -> str:
 
 
 def ratio(row: Row, best: Row | None) -> str:
-    """The best rasteriser's time over a row's."""
-    return f"{best.median_ms / row.median_ms:.2f} ×" if best and row.valid else ""
+    """The best rasteriser's time over a row's, and by processor time where that says otherwise."""
+    if not best or not row.valid:
+        return ""
+    text = f"{best.median_ms / row.median_ms:.2f} ×"
+    if best.median_cpu_ms and row.median_cpu_ms:
+        cpu = best.median_cpu_ms / row.median_cpu_ms
+        wall = best.median_ms / row.median_ms
+        text += f" [{cpu:.2f} ×]" if max(cpu, wall) > _NOTABLE * min(cpu, wall) else ""
+    return text
 
 
 def _ms(value: float) -> str:
@@ -93,11 +103,11 @@ def _printed(printed: Printed | None, mvr: Printed | None) -> str:
     return f"{printed.total_ms:.2f} ({mvr.total_ms / printed.total_ms:.2f} ×; {shared:.2f} ×)"
 
 
-def _full(found: list[list[Row]], paper: Callable[[Row], str], first: str = "") -> str:
+def _full(found: list[list[Row]], paper: Callable[[Row, Row | None], str], first: str = "") -> str:
     """Tables 1 and 2: one row a contender."""
     columns = (
         f"Scene{first} | Method | points, ms (number) | views, ms | panel image, ms | frame, ms | "
-        "× | memory, MB | RMSE of panel image (view) | SSIM (view) | "
+        "frames | × | memory, MB | RMSE of panel image (view) | SSIM (view) | "
         "paper: ms (×; × with one panel pass)"
     )
     lines = [f"| {columns} |", "|---" * (columns.count("|") + 1) + "|"]
@@ -118,11 +128,12 @@ def _full(found: list[list[Row]], paper: Callable[[Row], str], first: str = "") 
                 _ms(row.stage_ms("views")),
                 _ms(row.stage_ms("eia")),
                 f"{_ms(row.median_ms)} ± {100 * row.spread:.0f} %",
+                str(len(row.frames_ms)),
                 ratio(row, best),
                 f"{row.device_bytes / 1e6:.0f}",
                 _errors(row.eia_rmse, row.view_rmse, 2),
                 _errors(row.eia_ssim, row.view_ssim, 3),
-                paper(row),
+                paper(row, best),
             ]
             lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
@@ -132,17 +143,18 @@ def _supersample(row: Row) -> str:
     return "space" if row.supersample[0] > 1 else "angle" if row.supersample[1] > 1 else "none"
 
 
-def _of_table_1(row: Row) -> str:
+def _of_table_1(row: Row, best: Row | None) -> str:
     scene = paper_scene(row)
-    kind = "mvr" if row.technique == "mvr:multipass" else row.aa
-    if row.technique not in ("mvr:multipass", "lfdpr:paper"):
+    kind = "mvr" if row.technique == PLAIN_MVR else row.aa
+    if row.technique not in (PLAIN_MVR, "lfdpr:paper"):
         return ""
     return _printed(TABLE_1.get((scene, kind)), TABLE_1.get((scene, "mvr")))
 
 
-def _of_table_2(row: Row) -> str:
+def _of_table_2(row: Row, best: Row | None) -> str:
+    """The paper's rasterisation, which is plain, stands beside the best where only that is here."""
     key = (paper_scene(row), row.supersample)
-    if row.technique not in ("mvr:multipass", "lfdpr:paper"):
+    if row is not best and row.technique not in (PLAIN_MVR, "lfdpr:paper"):
         return ""
     kind = "mvr" if row.rasterises else "lfdpr"
     return _printed(TABLE_2.get((*key, kind)), TABLE_2.get((*key, "mvr")))
@@ -172,15 +184,18 @@ def _swept(found: list[list[Row]], label: str, of: Callable[[Row], str]) -> str:
 def _by_size(found: list[list[Row]]) -> str:
     """Speed and error by view size."""
     lines = [
-        "| Scene | views of | Method | frame, ms | × | RMSE of views | SSIM |",
-        "|---" * 7 + "|",
+        "| Scene | views of | SS | Method | frame, ms | × | RMSE of panel image (view) | "
+        "SSIM (view) |",
+        "|---" * 8 + "|",
     ]
     for rows in found:
         best = best_mvr(rows)
         lines += [
-            f"| {scene_name(row)} | {row.view_size[0]} × {row.view_size[1]} | {row.contender} | "
+            f"| {scene_name(row)} | {row.view_size[0]} × {row.view_size[1]} | "
+            f"{_supersample(row)} | {row.contender} | "
             f"{_ms(row.median_ms)} | {ratio(row, best)} | "
-            f"{_errors(None, row.view_rmse, 2)} | {_errors(None, row.view_ssim, 4)} |"
+            f"{_errors(row.eia_rmse, row.view_rmse, 2)} | "
+            f"{_errors(row.eia_ssim, row.view_ssim, 4)} |"
             for row in rows
             if row.valid
         ]
@@ -229,24 +244,22 @@ def _catalogue(found: list[list[Row]]) -> str:
 
 
 def _notes(found: list[list[Row]]) -> str:
-    """What is missing, and what was caught."""
-    gaps: dict[str, list[str]] = {}
+    """What is missing, and what was caught: by reason and scenes, all whom it is about."""
+    gaps: dict[str, dict[str, list[str]]] = {}
     for rows in found:
         for row in rows:
-            why = row.gap or (f"wrong picture, not timed: {row.fault}" if row.fault else None)
+            why = row.gap or (f"wrong picture, its time left out: {row.fault}" if row.fault else "")
             if why:
-                where = "" if row.gap and len(found) > 1 and _everywhere(found, row) else row.scene
-                gaps.setdefault(f"{row.contender}: {why}", []).append(where)
+                gaps.setdefault(why, {}).setdefault(row.contender, []).append(row.scene)
     lines = []
-    for text, places in gaps.items():
-        named = ", ".join(dict.fromkeys(place for place in places if place))
-        lines.append(f"- Missing: {text}" + (f" ({named})" if named else "") + ".")
+    for why, places in gaps.items():
+        by_scenes: dict[str, list[str]] = {}
+        for contender, scenes in places.items():
+            everywhere = len(found) > 1 and len(scenes) == len(found)
+            where = "" if everywhere else f" ({', '.join(dict.fromkeys(scenes))})"
+            by_scenes.setdefault(where, []).append(contender)
+        lines += [f"- Missing: {', '.join(who)}: {why}{w}." for w, who in by_scenes.items()]
     return "\n\n" + "\n".join(lines) if lines else ""
-
-
-def _everywhere(found: list[list[Row]], row: Row) -> bool:
-    same = [r for rows in found for r in rows if r.contender == row.contender]
-    return all(other.gap == row.gap for other in same)
 
 
 _TABLES: dict[str, tuple[str, Callable[[list[list[Row]]], str]]] = {

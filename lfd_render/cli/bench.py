@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json as json_module
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -19,12 +20,15 @@ from lfd_render.engine.texts import parse_size, parse_supersample
 from lfd_render.errors import EXIT_INTERRUPTED, LfdError, UsageError
 
 if TYPE_CHECKING:
+    from lfd_render.bench.estimate import Progress
     from lfd_render.bench.measure import Effort, Row
     from lfd_render.bench.results import Results
     from lfd_render.bench.suites import Axes, Group
     from lfd_render.display import DisplayProfile
+    from lfd_render.gpu.device import Device
 
-_QUICK_SUITES, _SUITES = ("aa",), ("aa", "supersample", "triangles", "views", "error")
+_QUICK_SUITES = ("aa",)
+_SUITES = ("mvr", "aa", "supersample", "triangles", "views", "error")
 _QUICK_TECHNIQUES = ("lfdpr", "lfdpr:paper", "mvr:multipass", "mvr:multipass-deferred")
 
 
@@ -44,7 +48,7 @@ def bench(
     suite: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="NAME", help="aa, supersample, triangles, views, error, mvr or rivals."
+            metavar="NAME", help="mvr, aa, supersample, triangles, views, error or rivals."
         ),
     ] = None,
     scene: Annotated[
@@ -52,7 +56,7 @@ def bench(
     ] = None,
     technique: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", help="lfdpr, lfdpr:paper, mvr:VARIANT or mvr:all."),
+        typer.Option(metavar="NAME", help="lfdpr, lfdpr:paper, mvr:VARIANT, mvr:all or mvr:best."),
     ] = None,
     rivals: Annotated[
         str | None,
@@ -66,10 +70,11 @@ def bench(
         list[str] | None, typer.Option(metavar="WHAT", help="Of suite supersample: 2, 2x1, 1x2, …")
     ] = None,
     views: Annotated[
-        list[int] | None, typer.Option(metavar="N", min=1, help="Of suites views and mvr.")
+        list[int] | None, typer.Option(metavar="N", min=1, help="Of suite views, besides 48.")
     ] = None,
     triangles: Annotated[
-        list[int] | None, typer.Option(metavar="N", min=1, help="Of suite triangles.")
+        list[int] | None,
+        typer.Option(metavar="N", min=1, help="Of suite triangles, besides their own."),
     ] = None,
     scene_triangles: Annotated[
         int | None,
@@ -77,9 +82,12 @@ def bench(
     ] = None,
     view_size: options.ViewSizeOption = None,
     rounds: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Counted frames of each.")
+        int | None, typer.Option(metavar="N", min=1, help="Counted frames of each, at most.")
     ] = None,
-    warm_ups: Annotated[int | None, typer.Option(metavar="N", min=0)] = None,
+    row_seconds: Annotated[
+        float | None,
+        typer.Option(metavar="S", min=0.0, help="What they may take; there are three at least."),
+    ] = None,
     samples: Annotated[
         int | None,
         typer.Option(metavar="N", min=1, max=16, help="Each way, a pixel of the standard's views."),
@@ -92,11 +100,18 @@ def bench(
         ),
     ] = None,
     display: options.DisplayOption = options.DEFAULT_DISPLAY,
+    against: Annotated[
+        str | None,
+        typer.Option(metavar="FOLDER", help="Measure nothing: compare with another run's ratios."),
+    ] = None,
     device: options.DeviceOption = "auto",
     json: options.JsonOption = False,
 ) -> None:
     """Time techniques against the best multi-view rasterisation, each picture checked first."""
     options.check_device(device)
+    if against is not None:
+        _compare(Path(output), Path(against), json=json)
+        return
     folder = check_folder_output(output)
 
     from lfd_render.bench.contenders import USUAL, techniques  # noqa: PLC0415 (keeps --help quick)
@@ -104,18 +119,19 @@ def bench(
     from lfd_render.bench.rivals import check_names  # noqa: PLC0415
     from lfd_render.bench.suites import FILTERS, Axes, groups_of  # noqa: PLC0415
     from lfd_render.display import DisplayProfile  # noqa: PLC0415
+    from lfd_render.renderer import upright_size  # noqa: PLC0415
 
+    profile = DisplayProfile.load(display)
     default = Axes()
     axes = Axes(
         scenes=tuple(scene or default.scenes),
         techniques=techniques(technique or (_QUICK_TECHNIQUES if quick else USUAL)),
         aa=tuple(f.value for f in aa) if aa else (("none",) if quick else FILTERS),
         supersample=_samples(supersample) or default.supersample,
-        views=tuple(views or ((24, 48) if quick else default.views)),
+        views=tuple(views or default.views),
         triangles=tuple(triangles or ((50_000, 100_000) if quick else default.triangles)),
-        view_sizes=((240, 180), (480, 360)) if quick else default.view_sizes,
         extra="textures=256" if quick else "",
-        main_views=48,
+        usual_size=upright_size(profile, default.main_views),
         rivals=check_names(rivals.split(",")) if rivals else (),
         main_size=parse_size("--view-size", view_size) or ((240, 180) if quick else None),
         main_triangles=(50_000 if quick else 0) if scene_triangles is None else scene_triangles,
@@ -123,7 +139,7 @@ def bench(
     default_effort = Effort()
     effort = Effort(
         rounds=rounds or (3 if quick else default_effort.rounds),
-        warm_ups=(1 if quick else default_effort.warm_ups) if warm_ups is None else warm_ups,
+        row_s=default_effort.row_s if row_seconds is None else row_seconds,
         compared=1 if quick else default_effort.compared,
         samples=samples or (4 if quick else default_effort.samples),
         gold_size=_gold_size(gold_size, None if quick else default_effort.gold_size),
@@ -132,7 +148,6 @@ def bench(
     if axes.rivals and "rivals" not in suites:
         suites.append("rivals")
     groups = groups_of(suites, axes)
-    profile = DisplayProfile.load(display)
     make_folder(folder)
     results, interrupted = _measure(folder, groups, axes, effort, profile=profile, device=device)
     tables = _write(folder, results)
@@ -143,9 +158,9 @@ def bench(
     faulty = [row for row in results.rows if row.fault]
     for row in faulty:
         warn(f"{row.scene}: {row.contender} {row.fault}")
-    missing = len(groups) - sum(group.key in results.groups for group in groups)
-    state = f", {missing} groups still to do" if missing else ""
-    say(f"{folder}: {len(results.groups)} groups of {len(groups)}{state}")
+    missing = sum(not results.done(group.key) for group in groups)
+    state = f", {missing} groups still to do; the same command goes on" if missing else ""
+    say(f"{folder}: {len(groups) - missing} groups of {len(groups)}{state}")
     if interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)
 
@@ -160,30 +175,37 @@ def _measure(
     device: str,
 ) -> tuple[Results, bool]:
     """Measure what is missing; whether someone stopped it."""
-    from lfd_render.bench.machine import describe  # noqa: PLC0415 (keeps --help quick)
+    from lfd_render.bench.estimate import Progress, seconds, span  # noqa: PLC0415 (quick --help)
+    from lfd_render.bench.machine import describe  # noqa: PLC0415
     from lfd_render.bench.measure import Bench, unmeasured  # noqa: PLC0415
     from lfd_render.bench.results import Results  # noqa: PLC0415
     from lfd_render.gpu.device import Device  # noqa: PLC0415
 
     opened = Device.open(device)
     try:
+        machine = describe(opened)
         settings = {
-            "machine": describe(opened),
+            "machine": machine,
             "display": profile.hash,
             "effort": dataclasses.asdict(effort),
             "axes": dataclasses.asdict(axes),
         }
         results = Results(folder, settings)
-        with _telling() as tell:
+        todo = [group for group in groups if not results.done(group.key)]
+        left = Progress([seconds(group, effort, opened, cores=machine["cores"]) for group in todo])
+        if todo:
+            say(f"{len(todo)} groups to measure, some {span(left.left_s)} on a quiet machine")
+        with _telling(left) as tell:
             bench = Bench(opened, profile, effort, tell)
-            todo = [group for group in groups if group.key not in results.groups]
-            for index, group in enumerate(todo):
-                tell.part = (index, len(todo))
+            for group, guess in zip(todo, left.guesses, strict=True):
+                begun = time.monotonic()
+                chosen = group.with_best(_best(results, group, opened))
                 try:
-                    rows = bench.rows(group)
+                    rows = bench.rows(chosen)
                 except (LfdError, MemoryError) as error:
-                    rows = unmeasured(group, error)
+                    rows = unmeasured(chosen, error)
                 results.add(rows)
+                left.add(guess, time.monotonic() - begun)
     except KeyboardInterrupt:
         return results, True
     finally:
@@ -191,26 +213,49 @@ def _measure(
     return results, False
 
 
-class _Teller:
-    """Says what is being done: on a terminal as a bar's text, else a line a change of scene."""
+def _best(results: Results, group: Group, device: Device) -> tuple[str, ...]:
+    """The rasterisers that the ranking of a group's scene found to be the best."""
+    from lfd_render.bench.contenders import fastest  # noqa: PLC0415 (keeps --help quick)
+    from lfd_render.bench.suites import RANKING, family  # noqa: PLC0415
 
-    def __init__(self, show: Callable[[float], None]) -> None:
-        self.part = (0, 1)
-        self._show = show
-        self._last = time.monotonic()
-
-    def __call__(self, text: str) -> None:
-        index, count = self.part
-        self._show(index / count)
-        if time.monotonic() - self._last > 20.0:
-            self._last = time.monotonic()
-            say(f"group {index + 1} of {count}: {text}")
+    times = {
+        row.technique: row.median_ms
+        for row in results.rows
+        if RANKING in row.suites and row.valid and family(row.scene) == family(group.scene)
+    }
+    return fastest(device, times, group.eyes)
 
 
 @contextmanager
-def _telling() -> Iterator[_Teller]:
+def _telling(left: Progress) -> Iterator[Callable[[str], None]]:
+    """Says what is being done and how long all will take: beside a bar on a terminal, else in a
+    line now and then."""
+    from lfd_render.bench.estimate import span  # noqa: PLC0415 (keeps --help quick)
+
+    said = time.monotonic()
     with progress_bar("Measuring") as show:
-        yield _Teller(show)
+
+        def tell(text: str) -> None:
+            nonlocal said
+            whole = f"{text}; {span(left.left_s)} left"
+            show(left.part, whole)
+            if time.monotonic() - said > 20.0 and not sys.stderr.isatty():
+                said = time.monotonic()
+                say(f"{100 * left.part:.0f} %: {whole}")
+
+        yield tell
+
+
+def _compare(folder: Path, other: Path, *, json: bool) -> None:
+    """Ratios of two runs."""
+    from lfd_render.bench.against import compare, table  # noqa: PLC0415 (keeps --help quick)
+    from lfd_render.bench.results import read_groups  # noqa: PLC0415
+
+    entries = compare(read_groups(folder), read_groups(other))
+    if json:
+        print_json({"folder": str(folder), "against": str(other), "ratios": entries})
+    else:
+        print_text(table(entries))
 
 
 def _write(folder: Path, results: Results) -> str:
@@ -248,6 +293,8 @@ def _row(row: Row, best: Row | None) -> dict[str, Any]:
         data |= {"median_ms": row.median_ms, "spread": round(row.spread, 4)}
     if row.valid and best:
         data |= {"best_mvr": best.technique, "ratio": round(best.median_ms / row.median_ms, 4)}
+        if row.median_cpu_ms and best.median_cpu_ms:
+            data["cpu_ratio"] = round(best.median_cpu_ms / row.median_cpu_ms, 4)
     return data
 
 

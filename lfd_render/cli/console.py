@@ -70,17 +70,18 @@ def progress(message: str) -> Iterator[None]:
 
 
 @contextmanager
-def progress_bar(message: str) -> Iterator[Callable[[float], None]]:
-    """A function that shows the part of a long work that is done, 0 to 1, on a terminal only."""
+def progress_bar(message: str) -> Iterator[Callable[..., None]]:
+    """A function that shows the part of a long work that is done, 0 to 1, and a text if given, on a
+    terminal only."""
     if not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
-        yield lambda _: None
+        yield lambda part, text="": None
         return
     from rich.console import Console  # noqa: PLC0415 (slow to import, of no use in a pipe)
     from rich.progress import Progress  # noqa: PLC0415
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(message, total=1.0)
-        yield lambda part: bar.update(task, completed=part)
+        yield lambda part, text=message: bar.update(task, completed=part, description=text)
 
 
 class Stopwatch:

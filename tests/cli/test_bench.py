@@ -19,11 +19,11 @@ SMALL = ("--suite", "aa", "--scene", "builtin:car", "--scene", "builtin:atrium",
 def measured(group: Group) -> list[Row]:
     return [
         Row(
-            group=group.key, suite=group.suite, scene=group.scene, triangles=1000, views=48,
+            group=group.key, suites=suites, scene=group.scene, triangles=1000, views=48,
             supersample=(1, 1), contender=c.name, technique=c.technique, aa=c.aa,
             frames_ms=[90.0 if c.rasterises else 30.0] * 3,
         )
-        for c in group.contenders
+        for c, suites in group.contenders.items()
     ]  # fmt: skip
 
 
@@ -42,7 +42,7 @@ def test_results_are_written_and_gone_on_with(
     folder = tmp_path / "bench"
     result = command("bench", folder, *SMALL)
     assert result.code == 130
-    assert "1 groups of 2, 1 groups still to do" in result.stderr
+    assert "1 groups of 2, 1 groups still to do; the same command goes on" in result.stderr
     assert "| 3.00 × |" in (folder / "tables.md").read_text()
     result = command("bench", folder, *SMALL, "--json")
     assert result.code == 0
@@ -50,6 +50,8 @@ def test_results_are_written_and_gone_on_with(
     ratios = [row["ratio"] for row in result.json["rows"]]
     assert ratios == [3.0, 1.0] * 2
     assert json.loads((folder / "results.json").read_text())["rows"] == result.json["rows"]
+    result = command("bench", folder, "--against", folder, "--json")
+    assert [r["differ"] for r in result.json["ratios"]] == [0.0] * 2
 
 
 def test_a_scene_that_fails_leaves_the_rest(
@@ -63,8 +65,15 @@ def test_a_scene_that_fails_leaves_the_rest(
     monkeypatch.setattr(Bench, "rows", rows)
     result = command("bench", tmp_path / "bench", *SMALL)
     assert result.code == 0
-    assert "Missing: lfdpr: too large for this machine (builtin:car)" in result.stdout
+    assert (
+        "Missing: lfdpr, mvr:multipass: too large for this machine (builtin:car)" in result.stdout
+    )
     assert "| 3.00 × |" in result.stdout
+    assert "1 groups of 2, 1 groups still to do" in result.stderr
+    monkeypatch.setattr(Bench, "rows", lambda self, group: measured(group))
+    result = command("bench", tmp_path / "bench", *SMALL)  # what failed is tried again
+    assert "Missing" not in result.stdout
+    assert "2 groups of 2" in result.stderr
 
 
 def test_other_settings_and_bad_options_are_named(

@@ -5,17 +5,20 @@ import json
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from lfd_render.bench import rivals
+from lfd_render.bench.against import compare, table
 from lfd_render.bench.check import Verdict, against_peers, detail_share, stray_view
-from lfd_render.bench.contenders import USUAL, Contender, techniques
-from lfd_render.bench.measure import Row, best_mvr
+from lfd_render.bench.contenders import USUAL, Contender, fastest, techniques
+from lfd_render.bench.estimate import Progress, span
+from lfd_render.bench.measure import Effort, Row, best_mvr
 from lfd_render.bench.papers import TABLE_1, TABLE_2
 from lfd_render.bench.plots import write_plots
-from lfd_render.bench.results import LINES, Results
+from lfd_render.bench.results import LINES, Results, read_groups
 from lfd_render.bench.suites import SUITES, Axes, groups_of, scene_source
 from lfd_render.bench.tables import report
 from lfd_render.display import DisplayProfile, Rig
@@ -29,13 +32,13 @@ SETTINGS = {
         "renderer": "llvmpipe", "driver": "4.5", "processor": "some", "cores": 2, "python": "3.11",
         "version": "0.1", "commit": "abc", "date": "2026-01-01",
     },
-    "effort": {"rounds": 3, "warm_ups": 1},
+    "effort": {"rounds": 15, "least": 3},
 }  # fmt: skip
 
 
 def row(technique: str, ms: float, **changes: object) -> Row:
     made = Row(
-        group="aa builtin:car 48 1x1 default", suite="aa", scene="builtin:car", triangles=300_000,
+        group="builtin:car 48 1x1 default", suites=("aa",), scene="builtin:car", triangles=300_000,
         views=48, supersample=(1, 1), contender=technique, technique=technique, aa="none",
         frames_ms=[ms, 1.1 * ms, 0.9 * ms], view_rmse=5.0, view_ssim=0.9, view_size=(480, 360),
         stages_ms={"transform": 1.0, "sample": 2.0, "splat": 3.0, "weave": 4.0}, device_bytes=10**8,
@@ -61,10 +64,84 @@ def test_a_filter_is_the_points_alone_in_the_papers_tables() -> None:
     space, angle = groups_of(["supersample"], axes)
     assert [c.aa for c in space.contenders] == ["spatial", "none"]
     assert [c.aa for c in angle.contenders] == ["angular", "none"]
-    assert len({g.key for g in groups_of(list(SUITES), axes)}) == len(groups_of(list(SUITES), axes))
     assert all(c.rasterises for g in groups_of(["mvr"], axes) for c in g.contenders)
-    with pytest.raises(UsageError, match="suite 'speed': unknown; use aa, supersample"):
+    with pytest.raises(UsageError, match="suite 'speed': unknown; use mvr, aa, supersample"):
         groups_of(["speed"], axes)
+
+
+def test_work_that_suites_share_is_done_once_after_its_scenes_ranking() -> None:
+    axes = Axes(techniques=techniques(USUAL), scenes=("builtin:car", "builtin:gallery"))
+    groups = groups_of([name for name in SUITES if name != "rivals"], axes)
+    assert len({group.key for group in groups}) == len(groups)
+    assert [g.scene.partition("?")[0] for g in groups] == sorted(
+        g.scene.partition("?")[0] for g in groups
+    )
+    ranking, main, *_ = groups
+    assert ranking.ranks
+    assert [c.technique for c in ranking.contenders] == sorted(
+        (f"mvr:{name}" for name in VARIANTS), key=lambda name: not name.endswith("-deferred")
+    )
+    shown = {c.name: set(suites) for c, suites in main.contenders.items()}
+    assert shown["lfdpr"] == {"aa", "views", "error", "triangles"}
+    assert shown["lfdpr, both AA"] == shown["lfdpr:paper"] == {"aa"}
+    assert shown["mvr:multipass"] == {"aa", "triangles"}
+    chosen = main.with_best(["mvr:loop-4-deferred", "mvr:multipass"]).contenders
+    for best in ("mvr:loop-4-deferred", "mvr:multipass"):
+        assert set(chosen[Contender(best)]) == shown["lfdpr"]
+    assert Contender("mvr:best") not in chosen
+    own = [g.scene for g in groups if "triangles" in g.suites and "car" in g.scene]
+    assert own == ["builtin:car", "builtin:car?triangles=100000", "builtin:car?triangles=1000000"]
+
+
+def test_slow_contenders_get_fewer_frames_and_fast_ones_no_more_than_asked() -> None:
+    effort = Effort(rounds=15, least=3, row_s=6.0)
+    assert [effort.frames(ms) for ms in (14_500, 1_000, 0.5)] == [3, 6, 15]
+    assert Effort(rounds=2).frames(14_500) == 2
+    assert effort.frames(0.5, ranks=True) == 1
+
+
+def test_the_ranking_keeps_what_may_be_the_best(monkeypatch: pytest.MonkeyPatch) -> None:
+    unable = {"mvr:loop-deferred"}
+    monkeypatch.setattr(Contender, "problem", lambda c, *_: "no" if c.technique in unable else None)
+    ms = {"mvr:multipass": 20, "mvr:loop-deferred": 5, "mvr:loop-4-deferred": 8,
+          "mvr:multipass-deferred": 9, "mvr:instanced-4-deferred": 9.5}  # fmt: skip
+    device: Any = None
+    assert fastest(device, ms, 48) == ("mvr:loop-4-deferred", "mvr:multipass-deferred")
+    assert fastest(device, {**ms, "mvr:multipass-deferred": 11.0}, 48)[1:] == (
+        "mvr:instanced-4-deferred",
+    )
+    assert fastest(device, {"mvr:multipass": 20, "mvr:loop-4": 30}, 48) == ("mvr:multipass",)
+    assert fastest(device, {}, 48) == ("mvr:multipass-deferred",)
+
+
+def test_time_left_follows_what_was_spent() -> None:
+    left = Progress([10.0, 30.0, 60.0])
+    assert (left.part, span(left.left_s)) == (0.0, "2 min")
+    left.add(10.0, 50.0)
+    assert left.part == 0.1
+    assert span(left.left_s) == "8 min"
+    assert (span(40), span(3900)) == ("40 s", "1 h 05 min")
+
+
+def test_two_runs_ratios_are_compared_by_the_same_rasteriser(tmp_path: Path) -> None:
+    here = [row("lfdpr", 10.0), row("mvr:loop-4", 40.0), row("mvr:multipass", 44.0)]
+    there = [row("lfdpr", 10.0), row("mvr:loop-4", 46.0), row("mvr:multipass", 45.0)]
+    (first, second) = compare({"g": here}, {"g": there})
+    assert (first["ratio"], first["other_ratio"], first["differ"]) == (4.0, 4.6, 0.15)
+    assert not first["same_best"]
+    assert second["differ"] == pytest.approx(1.1 / (45 / 46) - 1, abs=1e-4)
+    text = table([first, second])
+    assert "| g | lfdpr | 4.00 | 4.60 | 15.0 % |  | **over 10 %**" in text
+    assert "2 ratios in both runs; the greatest difference is 15.0 %, 2 exceed 10 %." in text
+    assert compare({"g": here}, {"other": there}) == []
+    for rows in (here, there):
+        for found in rows:
+            found.cpu_ms = [1.5 * ms for ms in found.frames_ms]
+    assert compare({"g": here}, {"g": there})[0]["cpu_differ"] == 0.15
+    with pytest.raises(OutputError, match="cannot be read"):
+        read_groups(tmp_path)
+    Results(tmp_path, SETTINGS).add(here)
+    assert list(read_groups(tmp_path)) == [here[0].group]
 
 
 def test_scenes_take_what_they_are_not_given() -> None:
@@ -147,7 +224,7 @@ def test_results_go_on_where_they_stopped(tmp_path: Path) -> None:
     later = json.loads(json.dumps(SETTINGS))
     later["machine"] |= {"date": "2026-01-02", "commit": "def"}
     again = Results(tmp_path, later)
-    assert list(again.groups) == ["aa builtin:car 48 1x1 default"]
+    assert list(again.groups) == ["builtin:car 48 1x1 default"]
     assert again.rows == results.rows[:2]
     assert again.settings["machine"]["commit"] == "abc"
     again.add(other)
@@ -158,7 +235,7 @@ def test_other_settings_are_refused_by_name(tmp_path: Path) -> None:
     Results(tmp_path, SETTINGS)
     changed = json.loads(json.dumps(SETTINGS))
     changed["effort"]["rounds"] = 5
-    with pytest.raises(UsageError, match=r"measured with effort\.rounds 3, not 5; go on with the"):
+    with pytest.raises(UsageError, match=r"measured with effort\.rounds 15, not 5; go on with the"):
         Results(tmp_path, changed)
     changed = json.loads(json.dumps(SETTINGS))
     changed["machine"]["renderer"] = "H100"
@@ -170,7 +247,7 @@ def test_other_settings_are_refused_by_name(tmp_path: Path) -> None:
     ("text", "said"),
     [
         ("no JSON\n", "line 1 has no settings"),
-        ('{"schema": "lfd-bench/0", "settings": {}}\n', "schema 'lfd-bench/0'"),
+        ('{"schema": "lfd-bench/1", "settings": {}}\n', "schema 'lfd-bench/1'"),
         ("{head}\n[]\n", "line 2 is no group of rows"),
         ('{head}\n{"rows": [{"group": "a"}]}\n', "line 2 is no group of rows"),
     ],
@@ -199,12 +276,12 @@ def test_tables_say_ratios_gaps_faults_and_the_papers_numbers() -> None:
     text = report(rows, SETTINGS)
     line = next(line for line in text.splitlines() if "lfdpr:paper" in line)
     assert "3.00 (1.23M)" in line
-    assert "| 2.50 × | 100 | 7.00 (5.00) | 0.800 (0.900) |" in line
+    assert "| 3 | 2.50 × | 100 | 7.00 (5.00) | 0.800 (0.900) |" in line
     assert "5.82 (8.07 ×; 6.72 ×)" in line  # the paper's ratio, and with one panel pass for both
     assert "**mvr:instanced-deferred**" in text
     assert "0.50 ×" in next(line for line in text.splitlines() if "P(N, →, □-□)" in line)
     assert "- Missing: mvr:multiview-4: lacks GL_OVR_multiview2" in text
-    assert "- Missing: lfdpr: wrong picture, not timed: shows nothing in view 3" in text
+    assert "- Missing: lfdpr: wrong picture, its time left out: shows nothing in view 3" in text
     assert "2026-01-01, commit abc: llvmpipe" in text
 
 
@@ -218,7 +295,7 @@ def test_every_suite_has_a_table_and_sweeps_a_plot(tmp_path: Path) -> None:
     rows = []
     for suite in SUITES:
         for size in (100_000, 1_000_000):
-            change = {"suite": suite, "group": f"{suite} {size}", "triangles": size}
+            change = {"suites": (suite,), "group": f"{suite} {size}", "triangles": size}
             rows += [row(Contender(n).technique, size / 1e3, **change) for n in USUAL[:4]]
     text = report(rows, SETTINGS)
     assert text.count("### ") == len(SUITES)
