@@ -103,6 +103,11 @@ def _printed(printed: Printed | None, mvr: Printed | None) -> str:
     return f"{printed.total_ms:.2f} ({mvr.total_ms / printed.total_ms:.2f} ×; {shared:.2f} ×)"
 
 
+def _notation(row: Row) -> str:
+    """004's name of a pipeline, whose bar would end a cell."""
+    return row.notation.replace("|", r"\|")
+
+
 def _full(found: list[list[Row]], paper: Callable[[Row, Row | None], str], first: str = "") -> str:
     """Tables 1 and 2: one row a contender."""
     columns = (
@@ -123,7 +128,7 @@ def _full(found: list[list[Row]], paper: Callable[[Row, Row | None], str], first
             mark = "**" if row is best else ""
             cells = [
                 scene,
-                f"{mark}{row.contender}{mark}" + (f" {row.notation}" if row.notation else ""),
+                f"{mark}{row.contender}{mark}" + (f" {_notation(row)}" if row.notation else ""),
                 points,
                 _ms(row.stage_ms("views")),
                 _ms(row.stage_ms("eia")),
@@ -227,7 +232,7 @@ def _catalogue(found: list[list[Row]]) -> str:
             share = f"{row.median_ms / plain.median_ms:.2f}" if plain else ""
             lines.append(
                 f"| {scene_name(row)} | {row.views} | {row.technique.removeprefix('mvr:')} | "
-                f"{row.notation} | {_ms(row.median_ms)} ± {100 * row.spread:.0f} % | {share} | "
+                f"{_notation(row)} | {_ms(row.median_ms)} ± {100 * row.spread:.0f} % | {share} | "
                 f"{row.device_bytes / 1e6:.0f} |"
             )
     names = list(CATALOGUE_COLUMNS)
