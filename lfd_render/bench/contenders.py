@@ -20,10 +20,12 @@ _PRESETS = ("default", "paper")
 
 @dataclass(frozen=True)
 class Contender:
-    """A technique, as ``lfdpr``, ``lfdpr:PRESET`` or ``mvr:VARIANT``, and a filter of the panel."""
+    """A technique, as ``lfdpr``, ``lfdpr:PRESET`` or ``mvr:VARIANT``, and a filter of the panel.
+    application: what it makes instead of a panel image, of `applications.APPLICATIONS`."""
 
     technique: str
     aa: str = "none"
+    application: str = ""
 
     @property
     def name(self) -> str:

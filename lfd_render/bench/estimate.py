@@ -18,6 +18,7 @@ _FRAME_S = {
     "mvr": (5.0, 8.0),
     "deferred": (1.7, 3.5),
 }
+_APPLICATIONS_S = {"ids": (0.3, 4.0), "g-buffers": (2.0, 5.0), "shadow maps": (0.3, 3.0)}
 _ROW_S = 2.0  # to upload, compile and judge
 _STANDARD_S = 4.0  # of a view
 _GOLD_S = 60.0
@@ -28,7 +29,11 @@ _HARDWARE = 0.01  # of the same frames
 def seconds(group: Group, effort: Effort, device: Device, *, cores: int) -> float:
     """Of one group."""
     speed = max(1, cores) / 2 if device.info.software else 1 / _HARDWARE
-    spent = _STANDARD_S * effort.compared * (effort.samples / 8) ** 2 / speed
+    spent = (
+        0.0
+        if group.application
+        else _STANDARD_S * effort.compared * (effort.samples / 8) ** 2 / speed
+    )
     if effort.gold_size and "aa" in group.suites:
         spent += _GOLD_S / speed
     for contender in group.contenders:
@@ -49,6 +54,8 @@ def _frame_s(group: Group, contender: Contender) -> float:
     deferred = contender.technique.endswith("-deferred") or contender.technique == BEST_MVR
     kind = "deferred" if deferred else "mvr" if contender.rasterises else contender.technique
     pixels, triangles = _FRAME_S.get(kind, _FRAME_S["deferred"])
+    if contender.application and contender.rasterises:
+        pixels, triangles = _APPLICATIONS_S[contender.application]
     width, height = group.view_size or (480, 360)
     share = width * height * group.supersample[0] ** 2 / (480 * 360)
     return (pixels * share + triangles * millions) * group.eyes / 48

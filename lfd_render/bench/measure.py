@@ -18,6 +18,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from lfd_render.bench import applications
 from lfd_render.bench.check import Standard, Verdict, against_peers, verdict
 from lfd_render.bench.contenders import Contender
 from lfd_render.bench.gold import LEAST_SEEN, alone, chosen_views, gold_standard
@@ -36,6 +37,7 @@ Pixels = NDArray[np.uint8]
 Told = Callable[[str], None]
 _ELSEWHERE_RAD = 0.35  # how far the frame before the one that is judged is turned away
 _HOPELESS = 2.0  # times as slow as the fastest of a ranking so far
+_MOST_DIFFERENT = 0.02  # of buffers' pixels; on edges points and rasterisation may differ
 _MOST_MISSED = 0.05  # of what a standard shows; its edges are finer than a rival's
 _PANEL_STAGES = ("average", "encode_srgb", "weave")
 _POINT_STAGES = ("transform", "sample")
@@ -68,7 +70,8 @@ class Row:
     """What one contender did in a group. suites: that show it; gap: why there is nothing, or None;
     fault: what is wrong with its picture. Times in ms, cpu: the processor time of this process;
     memory in bytes; eia: against the panel image's standard, view: against single views' as an eye
-    sees them, RMSE in levels of 255."""
+    sees them, RMSE in levels of 255; differs: share of pixels in which an application's buffers are
+    nobody else's."""
 
     group: str
     suites: tuple[str, ...]
@@ -79,6 +82,7 @@ class Row:
     contender: str
     technique: str
     aa: str
+    application: str = ""
     notation: str = ""
     gap: str | None = None
     fault: str | None = None
@@ -93,6 +97,7 @@ class Row:
     view_rmse: float | None = None
     view_ssim: float | None = None
     detail: float | None = None
+    differs: float | None = None
     eia_rmse: float | None = None
     eia_ssim: float | None = None
 
@@ -161,7 +166,7 @@ class _Running:
     outside."""
 
     row: Row
-    renderer: Renderer
+    renderer: Renderer | None
     stage: Frames
     warm_ms: float  # of the frame before those that count
     rounds: int = 1
@@ -189,6 +194,8 @@ class Bench:
         self._told(f"{group.scene}: loading")
         scene = self._load(group.scene)
         camera = camera_for(scene, self._display)
+        if group.application:
+            return self._application(group, scene, camera)
         standard = self._standard(group, scene, camera)
         gold = self._gold_eia(group, scene, camera)
         rows: list[Row] = []
@@ -218,6 +225,41 @@ class Bench:
                 self._first(group, found, camera, standard, gold)
             _judge_together(running)
             self._run(group, [found for found in running if not found.row.fault], camera)
+        finally:
+            for found in running:
+                _close(found)
+        return rows
+
+    def _application(self, group: Group, scene: Scene, camera: Camera) -> list[Row]:
+        """Buffers instead of panel images, judged by whether contenders agree."""
+        rows: list[Row] = []
+        running: list[_Running] = []
+        buffers: list[NDArray[np.float64]] = []
+        assert group.view_size is not None
+        try:
+            for contender, suites in group.contenders.items():
+                row = self._row(group, scene, contender, suites)
+                rows.append(row)
+                row.gap = contender.problem(self._device, group.views)
+                if row.gap:
+                    continue
+                self._told(f"{group.scene}: preparing {row.contender}, {row.application}")
+                with _naming_gaps(row):
+                    before = self._device.ledger.total
+                    frames = applications.start(
+                        self._device, scene, self._display, contender, views=group.views,
+                        size=group.view_size,
+                    )  # fmt: skip
+                    found = _Running(row, None, frames, frames.frame(camera.turned(_ELSEWHERE_RAD)))
+                    running.append(found)
+                    row.device_bytes = self._device.ledger.total - before
+                    row.view_size = group.view_size
+                    _count(found, camera)
+                    found.rounds = self._effort.frames(row.frames_ms[0])
+                    buffers.append(frames.read())
+            able = [found for found in running if found.row.gap is None]
+            _judge_buffers(able, buffers, group.application)
+            self._run(group, [found for found in able if not found.row.fault], camera)
         finally:
             for found in running:
                 _close(found)
@@ -272,7 +314,8 @@ class Bench:
         return Row(
             group=group.key, suites=suites, scene=group.scene, triangles=scene.triangle_count,
             views=group.views, supersample=group.supersample, contender=contender.name,
-            technique=contender.technique, aa=contender.aa, notation=contender.notation,
+            technique=contender.technique, aa=contender.aa, application=contender.application,
+            notation=contender.notation,
         )  # fmt: skip
 
     def _start(
@@ -383,19 +426,42 @@ def _count(found: _Running, camera: Camera) -> None:
     """One counted frame."""
     begun = time.process_time()
     ms = found.stage.frame(camera)
-    if isinstance(found.stage, Stage):  # others work in other processes
+    if not isinstance(found.stage, Outside):  # which works in another process
         found.row.cpu_ms.append(round(1000 * (time.process_time() - begun), 3))
     found.row.frames_ms.append(round(ms, 3))
 
 
 def _close(found: _Running) -> None:
     found.stage.close()
-    found.renderer.close()
+    if found.renderer:
+        found.renderer.close()
 
 
 def _stages(timings: dict[str, float]) -> dict[str, float]:
     done_once = ("frame", "read", "upload", "compile", "prefilter")
     return {name: ms for name, ms in timings.items() if name not in done_once}
+
+
+def _judge_buffers(
+    running: list[_Running], buffers: list[NDArray[np.float64]], application: str
+) -> None:
+    """Who agrees with nobody is wrong; with one alone there is no telling but of nothing at all."""
+    for found, mine in zip(running, buffers, strict=True):
+        shares = [applications.differ(mine, other, application)
+                  for other in buffers if other is not mine]  # fmt: skip
+        found.row.differs = min(shares, default=None)
+        if np.ptp(mine) == 0:
+            found.row.fault = "shows nothing"
+        elif found.row.differs is not None and found.row.differs > _MOST_DIFFERENT:
+            found.row.fault = (
+                f"differs from all others in {100 * found.row.differs:.1f} % of pixels"
+            )
+        if found.row.fault:
+            _throw_away(found.row)
+
+
+def _throw_away(row: Row) -> None:
+    row.frames_ms, row.cpu_ms, row.stages_ms = [], [], {}
 
 
 def _judge_together(running: list[_Running]) -> None:
@@ -409,7 +475,7 @@ def _judge_together(running: list[_Running]) -> None:
         row.fault, row.view_rmse, row.view_ssim = final.fault, final.rmse, final.ssim
         row.detail = final.detail
         if row.fault:
-            row.frames_ms, row.cpu_ms, row.stages_ms = [], [], {}
+            _throw_away(row)
 
 
 def unmeasured(group: Group, error: LfdError | MemoryError) -> list[Row]:
@@ -418,7 +484,8 @@ def unmeasured(group: Group, error: LfdError | MemoryError) -> list[Row]:
         Row(
             group=group.key, suites=suites, scene=group.scene, triangles=0, views=group.views,
             supersample=group.supersample, contender=contender.name,
-            technique=contender.technique, aa=contender.aa, notation=contender.notation,
+            technique=contender.technique, aa=contender.aa, application=contender.application,
+            notation=contender.notation,
             gap=str(error) or type(error).__name__,
         )
         for contender, suites in group.contenders.items()

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from lfd_render.bench.applications import APPLICATIONS
 from lfd_render.bench.contenders import ALL_MVR, BEST_MVR, PLAIN_MVR, Contender, techniques
 from lfd_render.errors import UsageError
 from lfd_render.scene.builtin import BUILTINS, PREFIX
@@ -42,12 +43,18 @@ class Group:
         """What tells it from all other groups of a run but the contenders."""
         size = "x".join(map(str, self.view_size)) if self.view_size else "default"
         samples = "x".join(map(str, self.supersample))
-        return f"{self.scene} {self.views} {samples} {size}"
+        application = f" {self.application}" if self.application else ""
+        return f"{self.scene} {self.views} {samples} {size}{application}"
 
     @property
     def suites(self) -> set[str]:
         """All that show some of it."""
         return {suite for suites in self.contenders.values() for suite in suites}
+
+    @property
+    def application(self) -> str:
+        """What all make instead of a panel image; empty for one."""
+        return next((contender.application for contender in self.contenders), "")
 
     @property
     def eyes(self) -> int:
@@ -225,6 +232,18 @@ def _mvr(axes: Axes) -> list[Group]:
     ]
 
 
+def _applications(axes: Axes) -> list[Group]:
+    """Tables 2 to 4 of the catalogue: forward pipelines, for nothing is shaded."""
+    size = axes.main_size or axes.usual_size
+    return [
+        _group(axes, "applications", _main(axes, s),
+               [Contender(name, application=application) for name in names], views=n, size=size)
+        for application, names in APPLICATIONS.items()
+        for s in axes.scenes
+        for n in axes.buffer_views
+    ]  # fmt: skip
+
+
 def _rivals(axes: Axes) -> list[Group]:
     """Programs from outside, which render views of one size and weave none."""
     contenders = (*_few(axes), *(Contender(name) for name in axes.rivals))
@@ -241,6 +260,7 @@ SUITES: dict[str, Callable[[Axes], list[Group]]] = {
     "views": _views,
     "error": _error,
     "triangles": _triangles,
+    "applications": _applications,
     "rivals": _rivals,
 }
 
@@ -251,7 +271,7 @@ def groups_of(suites: Sequence[str], axes: Axes) -> list[Group]:
     for name in suites:
         if name not in SUITES:
             raise UsageError(f"suite '{name}': unknown; use {', '.join(SUITES)}")
-    if BEST_MVR in axes.techniques:
+    if BEST_MVR in axes.techniques and set(suites) != {"applications"}:
         suites = (*suites, RANKING)
     found: dict[str, Group] = {}
     for name in (name for name in SUITES if name in suites):

@@ -7,14 +7,7 @@ from typing import Any
 
 from lfd_render.bench.contenders import PLAIN_MVR
 from lfd_render.bench.measure import Row, best_mvr
-from lfd_render.bench.papers import (
-    CATALOGUE,
-    CATALOGUE_COLUMNS,
-    TABLE_1,
-    TABLE_2,
-    TABLE_MVR,
-    Printed,
-)
+from lfd_render.bench.papers import CATALOGUE, TABLE_1, TABLE_2, Printed
 from lfd_render.bench.suites import SCENES
 
 _NOTABLE = 1.1
@@ -224,7 +217,7 @@ def _outside(found: list[list[Row]]) -> str:
 
 
 def _catalogue(found: list[list[Row]]) -> str:
-    """All rasterisers, ranked in each group; then the columns that 004's tables have."""
+    """All rasterisers, ranked in each group."""
     lines = ["| Scene | views | Pipeline | | frame, ms | of plain | memory, MB |", "|---" * 7 + "|"]
     for rows in found:
         plain = next((r for r in rows if r.technique == "mvr:multipass" and r.valid), None)
@@ -235,17 +228,53 @@ def _catalogue(found: list[list[Row]]) -> str:
                 f"{_notation(row)} | {_ms(row.median_ms)} ± {100 * row.spread:.0f} % | {share} | "
                 f"{row.device_bytes / 1e6:.0f} |"
             )
-    names = list(CATALOGUE_COLUMNS)
-    lines += ["", f"| Scene | views | {' | '.join(names)} |", "|---" * (len(names) + 2) + "|"]
-    for rows in found:
-        of = {row.technique: row for row in rows}
-        wanted = [of.get(technique) for technique in CATALOGUE_COLUMNS.values()]
-        cells = [_ms(r.median_ms) if r and r.valid else "–" for r in wanted]
-        scene = next((r for r in rows if r.triangles), rows[0])
-        lines.append(f"| {scene_name(scene)} | {rows[0].views} | {' | '.join(cells)} |")
-    for views, printed in TABLE_MVR.items():
-        lines.append(f"| printed: {CATALOGUE} | {views} | {' | '.join(map(str, printed))} |")
     return "\n".join(lines)
+
+
+def _applications(found: list[list[Row]]) -> str:
+    """Tables 2 to 4 of the catalogue, an application after another, and what it printed."""
+    parts = []
+    for application, (where, printed) in CATALOGUE.items():
+        groups = [rows for rows in found if rows[0].application == application]
+        if not groups:
+            continue
+        columns = {
+            "M.Pass": PLAIN_MVR,
+            "GSL4": "mvr:loop-4-frustum" if application == "ids" else "mvr:loop-4",
+            "GSI4": "mvr:invocations-4",
+            "OVR4": "mvr:multiview-4",
+        }
+        count = "lights" if application == "shadow maps" else "views"
+        lines = [
+            f"| {application} of | {count} | {' | '.join(columns)} | LFDPR | pixels that differ |",
+            "|---" * (len(columns) + 4) + "|",
+        ]
+        for rows in groups:
+            of = {row.technique: row for row in rows if row.valid}
+            least = min((row.median_ms for row in of.values()), default=0.0)
+            cells = []
+            for technique in (*columns.values(), "lfdpr"):
+                row = of.get(technique)
+                mark = "**" if row and row.median_ms == least else ""
+                cells.append(f"{mark}{_ms(row.median_ms)}{mark}" if row else "–")
+            most = max(
+                (row.differs for row in of.values() if row.differs is not None), default=None
+            )
+            width, height = next((r.view_size for r in rows if r.valid), (0, 0))
+            apart = "" if most is None else f"{100 * most:.3f} %"
+            scene = next((r for r in rows if r.triangles), rows[0])
+            lines.append(
+                f"| {scene_name(scene)}, {width} × {height} | {rows[0].views} | "
+                f"{' | '.join(cells)} | {apart} |"
+            )
+        for number, rows_of in enumerate(printed, 1):
+            for views, times in rows_of.items():
+                lines.append(
+                    f"| printed: {where}, scene {number}, RTX 2080 | {views} | "
+                    f"{' | '.join(map(str, times))} | | |"
+                )
+        parts.append("\n".join(lines))
+    return "\n\n".join(parts)
 
 
 def _notes(found: list[list[Row]]) -> str:
@@ -276,6 +305,10 @@ _TABLES: dict[str, tuple[str, Callable[[list[list[Row]]], str]]] = {
     "triangles": ("Time against triangles", lambda g: _swept(g, "views", lambda r: str(r.views))),
     "views": ("Time against views", lambda g: _swept(g, "views", lambda r: str(r.views))),
     "error": ("Speed against error (as Fig. 6 of EPR)", _by_size),
-    "mvr": ("The catalogue of multi-view rasterisation (Tables 2 to 4 of it)", _catalogue),
+    "mvr": ("The ranking of the catalogue of multi-view rasterisation", _catalogue),
+    "applications": (
+        "Applications (Tables 2 to 4 of the catalogue), milliseconds",
+        _applications,
+    ),
     "rivals": ("Programs from outside, same scene, eyes, view size and machine", _outside),
 }

@@ -48,7 +48,8 @@ def bench(
     suite: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="NAME", help="mvr, aa, supersample, triangles, views, error or rivals."
+            metavar="NAME",
+            help="mvr, aa, supersample, triangles, views, error, applications or rivals.",
         ),
     ] = None,
     scene: Annotated[

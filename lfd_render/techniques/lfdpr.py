@@ -212,3 +212,23 @@ class Lfdpr:
             self._shared.release()
         self._views.release()
         self.target.release()
+
+
+class PointIds(Lfdpr):
+    """transform → sample → splat: the nearest triangle of each view pixel, and no more, blended
+    ones as solid."""
+
+    def render(self, band: Band, clock: StageClock) -> None:
+        """Sample and splat one band of rows."""
+        with clock.stage("sample"):
+            self._sample(band)
+        with clock.stage("splat"):
+            self._views.clear()
+            self._find_winners(self._batches(), band)
+
+    def read(self, band: Band) -> NDArray[np.uint32]:
+        """Global ids of the band rendered last, or NO_TRIANGLE, [view, row, column]."""
+        shape = band.rows, self.target.rig.views, self.target.grid.columns
+        stride = self._views.word_stride
+        words = self._views.words.read(np.uint32, stride * int(np.prod(shape)))
+        return np.ascontiguousarray(words[::stride].reshape(shape).transpose(1, 0, 2))

@@ -6,6 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from lfd_render.bench import measure
+from lfd_render.bench.applications import APPLICATIONS
 from lfd_render.bench.contenders import Contender
 from lfd_render.bench.measure import Bench, Effort, Row, best_mvr
 from lfd_render.bench.suites import Group
@@ -13,6 +14,7 @@ from lfd_render.display import DisplayProfile
 from lfd_render.errors import ResourceError
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
+from lfd_render.passes.raster import Raster
 from lfd_render.passes.view_target import Band
 from lfd_render.renderer import Renderer, renderer
 from lfd_render.renderer.options import RenderOptions
@@ -145,6 +147,43 @@ def test_planted_faults_are_caught(
     assert not rows[0].frames_ms
     assert not rows[0].valid
     assert rows[1].valid
+
+
+def applications_of(device: Device, display: DisplayProfile, application: str) -> dict[str, Row]:
+    names = APPLICATIONS[application]
+    contenders = [Contender(name, application=application) for name in names]
+    group = Group(SCENE, 12, (1, 1), dict.fromkeys(contenders, ("applications",)), SIZE)
+    rows = Bench(device, display, EFFORT).rows(group)
+    return {row.technique: row for row in rows if row.gap is None}
+
+
+@pytest.mark.parametrize("application", APPLICATIONS)
+def test_applications_agree_and_a_planted_fault_is_named(
+    device: Device,
+    display: DisplayProfile,
+    monkeypatch: pytest.MonkeyPatch,
+    application: str,
+) -> None:
+    before = device.ledger.total
+    rows = applications_of(device, display, application)
+    assert device.ledger.total == before
+    assert {"mvr:multipass", "mvr:loop-4"} & set(rows)
+    assert ("lfdpr" in rows) == (application == "ids")
+    for row in rows.values():
+        assert row.fault is None
+        assert row.differs < 0.01
+        assert len(row.frames_ms) == 3
+    draw = Raster.draw
+
+    def less(self: Raster, step: int, *arguments: object, **options: object) -> None:
+        if self.pipeline.name != "multipass" or step != 5:
+            draw(self, step, *arguments, **options)
+
+    monkeypatch.setattr(Raster, "draw", less)
+    rows = applications_of(device, display, application)
+    assert "differs from all others" in (rows["mvr:multipass"].fault or "")
+    assert not rows["mvr:multipass"].valid
+    assert all(row.valid for name, row in rows.items() if name != "mvr:multipass")
 
 
 @pytest.mark.parametrize("error", [ResourceError("too many texels"), MemoryError("no room")])
