@@ -454,7 +454,7 @@ def _judge_buffers(
             found.row.fault = "shows nothing"
         elif found.row.differs is not None and found.row.differs > _MOST_DIFFERENT:
             found.row.fault = (
-                f"differs from all others in {100 * found.row.differs:.1f} % of pixels"
+                f"differs from all others in {100 * found.row.differs:.1f} % of a view"
             )
         if found.row.fault:
             _throw_away(found.row)

@@ -12,6 +12,7 @@ import pytest
 
 from lfd_render.bench import rivals
 from lfd_render.bench.against import compare, table
+from lfd_render.bench.applications import differ
 from lfd_render.bench.check import Verdict, against_peers, detail_share, stray_view
 from lfd_render.bench.contenders import USUAL, Contender, fastest, techniques
 from lfd_render.bench.estimate import Progress, span
@@ -260,6 +261,14 @@ def test_files_that_are_none_of_ours_are_refused(tmp_path: Path, text: str, said
     with pytest.raises(OutputError, match=said):
         Results(tmp_path, SETTINGS)
     assert path.read_text() == made
+
+
+def test_one_view_that_is_missing_of_many_shows() -> None:
+    ids = np.full((32, 40, 40, 1), 4e9)
+    ids[:, 10:26, 10:26] = 7.0  # a sixth of each view
+    less = ids.copy()
+    less[3] = 4e9
+    assert differ(ids, less, "ids") == pytest.approx(0.16)
 
 
 # ---- tables and plots -------------------------------------------------------------------------
