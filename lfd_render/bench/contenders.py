@@ -16,21 +16,43 @@ PLAIN_MVR = "mvr:multipass"
 BEST_COUNT, _CLOSE = 2, 1.25  # how much slower than the fastest one may be and still become it
 USUAL = ("lfdpr", "lfdpr:paper", PLAIN_MVR, BEST_MVR)
 _PRESETS = ("default", "paper")
+# Each changes one choice of the default preset (docs/lfdpr.md).
+IDEAS: dict[str, dict[str, Any]] = {
+    "density isotropic": {"density": "isotropic"},
+    "no texture limit": {"texture_limit": False},
+    "stochastic culling": {"stochastic_culling": True},
+    "culling by vertices": {"culling": "vertices"},
+    "shade by rays": {"shade": "ray"},
+    "shade at points": {"shade": "point"},
+    "lattice paper": {"lattice": "paper"},
+    "lattice paper, isotropic": {"lattice": "paper", "density": "isotropic"},
+    "lattice paper, no limit": {"lattice": "paper", "texture_limit": False},
+    "lattice paper, raster": {"lattice": "paper", "point_source": "raster"},
+    "splat two-pass": {"splat": "two-pass"},
+    "lod none": {"lod": "none"},
+    "lod area": {"lod": "area"},
+    "lod long-axis": {"lod": "long-axis"},
+    "lod multiview": {"lod": "multiview"},
+    "weave linear": {"weave": "linear"},
+}
 
 
 @dataclass(frozen=True)
 class Contender:
     """A technique, as ``lfdpr``, ``lfdpr:PRESET`` or ``mvr:VARIANT``, and a filter of the panel.
-    application: what it makes instead of a panel image, of `applications.APPLICATIONS`."""
+    application: what it makes instead of a panel image, of `applications.APPLICATIONS`; idea: what
+    it does otherwise, of IDEAS."""
 
     technique: str
     aa: str = "none"
     application: str = ""
+    idea: str = ""
 
     @property
     def name(self) -> str:
         """What tables call it."""
-        return self.technique + ("" if self.aa == "none" else f", {self.aa} AA")
+        aa = "" if self.aa == "none" else f"{self.aa} AA"
+        return ", ".join(filter(None, (self.technique, aa, self.idea)))
 
     @property
     def rasterises(self) -> bool:
@@ -47,7 +69,13 @@ class Contender:
         """Of `RenderOptions`."""
         kind, _, detail = self.technique.partition(":")
         chosen = {"mvr": detail} if kind == "mvr" else {"preset": detail or "default"}
-        return {"technique": kind, "aa": self.aa, "linear": False, **chosen}
+        return {
+            "technique": kind,
+            "aa": self.aa,
+            "linear": False,
+            **chosen,
+            **IDEAS.get(self.idea, {}),
+        }
 
     def problem(self, device: Device, eyes: int) -> str | None:
         """Why the device cannot run it; None if it can."""

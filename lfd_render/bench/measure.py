@@ -296,7 +296,7 @@ class Bench:
     def _gold_eia(self, group: Group, scene: Scene, camera: Camera) -> Pixels | None:
         """The panel image's standard for the suites that tell of it."""
         size = self._effort.gold_size
-        if size is None or not group.suites & {"aa", "supersample", "error"}:
+        if size is None or not group.suites & {"aa", "supersample", "error", "ideas"}:
             return None
         if group.scene not in self._gold:
             self._told(f"{group.scene}: standard of the panel image")

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from lfd_render.bench.applications import APPLICATIONS
-from lfd_render.bench.contenders import ALL_MVR, BEST_MVR, PLAIN_MVR, Contender, techniques
+from lfd_render.bench.contenders import ALL_MVR, BEST_MVR, IDEAS, PLAIN_MVR, Contender, techniques
 from lfd_render.errors import UsageError
 from lfd_render.scene.builtin import BUILTINS, PREFIX
 
@@ -244,6 +244,13 @@ def _applications(axes: Axes) -> list[Group]:
     ]  # fmt: skip
 
 
+def _ideas(axes: Axes) -> list[Group]:
+    """LFDPR's default, each of its ideas changed, the paper's preset and plain rasterisation."""
+    contenders = [Contender("lfdpr"), *(Contender("lfdpr", idea=idea) for idea in IDEAS),
+                  Contender("lfdpr:paper"), Contender(PLAIN_MVR)]  # fmt: skip
+    return [_group(axes, "ideas", _main(axes, s), contenders) for s in axes.scenes]
+
+
 def _rivals(axes: Axes) -> list[Group]:
     """Programs from outside, which render views of one size and weave none."""
     contenders = (*_few(axes), *(Contender(name) for name in axes.rivals))
@@ -261,6 +268,7 @@ SUITES: dict[str, Callable[[Axes], list[Group]]] = {
     "error": _error,
     "triangles": _triangles,
     "applications": _applications,
+    "ideas": _ideas,
     "rivals": _rivals,
 }
 
@@ -271,7 +279,7 @@ def groups_of(suites: Sequence[str], axes: Axes) -> list[Group]:
     for name in suites:
         if name not in SUITES:
             raise UsageError(f"suite '{name}': unknown; use {', '.join(SUITES)}")
-    if BEST_MVR in axes.techniques and set(suites) != {"applications"}:
+    if BEST_MVR in axes.techniques and not set(suites) <= {"applications", "ideas"}:
         suites = (*suites, RANKING)
     found: dict[str, Group] = {}
     for name in (name for name in SUITES if name in suites):

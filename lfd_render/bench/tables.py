@@ -200,6 +200,28 @@ def _by_size(found: list[list[Row]]) -> str:
     return "\n".join(lines)
 
 
+def _ideas(found: list[list[Row]]) -> str:
+    """What each idea of LFDPR gives."""
+    lines = [
+        "| Scene | Method | points | frame, ms | of lfdpr's | RMSE of panel image (view) | "
+        "SSIM (view) |",
+        "|---" * 7 + "|",
+    ]
+    for rows in found:
+        base = next((r for r in rows if r.contender == "lfdpr" and r.valid), None)
+        for row in rows:
+            if row.valid:
+                share = f"{row.median_ms / base.median_ms:.2f} ×" if base else ""
+                points = f"{row.points:,}" if row.points else ""
+                lines.append(
+                    f"| {scene_name(row)} | {row.contender} | {points} | "
+                    f"{_ms(row.median_ms)} ± {100 * row.spread:.0f} % | {share} | "
+                    f"{_errors(row.eia_rmse, row.view_rmse, 2)} | "
+                    f"{_errors(row.eia_ssim, row.view_ssim, 4)} |"
+                )
+    return "\n".join(lines)
+
+
 def _outside(found: list[list[Row]]) -> str:
     """Programs from outside, against LFDPR's whole frame."""
     lines = ["| Scene | Method | frame, ms | of lfdpr's | leaves out |", "|---" * 5 + "|"]
@@ -310,5 +332,6 @@ _TABLES: dict[str, tuple[str, Callable[[list[list[Row]]], str]]] = {
         "Applications (Tables 2 to 4 of the catalogue), milliseconds",
         _applications,
     ),
+    "ideas": ("Each idea of LFDPR, on and off", _ideas),
     "rivals": ("Programs from outside, same scene, eyes, view size and machine", _outside),
 }

@@ -49,7 +49,7 @@ def bench(
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="mvr, aa, supersample, triangles, views, error, applications or rivals.",
+            help="mvr, aa, supersample, triangles, views, error, applications, ideas or rivals.",
         ),
     ] = None,
     scene: Annotated[
@@ -161,6 +161,8 @@ def bench(
         warn(f"{row.scene}: {row.contender} {row.fault}")
     missing = sum(not results.done(group.key) for group in groups)
     state = f", {missing} groups still to do; the same command goes on" if missing else ""
+    if quick and not suite:
+        say(f"--quick leaves out {', '.join(s for s in _SUITES if s not in _QUICK_SUITES)}")
     say(f"{folder}: {len(groups) - missing} groups of {len(groups)}{state}")
     if interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)

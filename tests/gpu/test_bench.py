@@ -186,6 +186,18 @@ def test_applications_agree_and_a_planted_fault_is_named(
     assert all(row.valid for name, row in rows.items() if name != "mvr:multipass")
 
 
+def test_ideas_that_change_no_pixel_change_none(device: Device, display: DisplayProfile) -> None:
+    tried = ("", "density isotropic", "shade by rays", "lattice paper", "lod none")
+    contenders = [Contender("lfdpr", idea=idea) for idea in tried]
+    group = Group(SCENE, 12, (1, 1), dict.fromkeys(contenders, ("ideas",)), SIZE)
+    rows = Bench(device, display, dataclasses.replace(EFFORT, rounds=1)).rows(group)
+    base, isotropic, rays, paper, _ = (row.view_rmse for row in rows)
+    assert isotropic == base
+    assert paper == rays != base
+    assert rows[1].points > rows[0].points
+    assert rows[4].view_rmse > rows[0].view_rmse
+
+
 @pytest.mark.parametrize("error", [ResourceError("too many texels"), MemoryError("no room")])
 def test_what_one_cannot_do_is_its_gap_alone(
     device: Device, display: DisplayProfile, monkeypatch: pytest.MonkeyPatch, error: Exception
