@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 from lfd_render.bench.applications import APPLICATIONS
 from lfd_render.bench.contenders import ALL_MVR, BEST_MVR, IDEAS, PLAIN_MVR, Contender, techniques
-from lfd_render.errors import UsageError
-from lfd_render.scene.builtin import BUILTINS, PREFIX
+from lfd_render.errors import SceneError, UsageError
+from lfd_render.scene.builtin import BUILTINS, PREFIX, parse_builtin
 
 # The paper's scenes and those of their kinds that the project makes.
 SCENES = {
@@ -275,7 +275,8 @@ SUITES: dict[str, Callable[[Axes], list[Group]]] = {
 
 def groups_of(suites: Sequence[str], axes: Axes) -> list[Group]:
     """All groups, those of a scene one after another, its ranking first. What several suites ask
-    for is one group. Raises UsageError for an unknown suite."""
+    for is one group. Raises UsageError for an unknown suite, SceneError for built-in scenes that
+    there are none of."""
     for name in suites:
         if name not in SUITES:
             raise UsageError(f"suite '{name}': unknown; use {', '.join(SUITES)}")
@@ -290,8 +291,18 @@ def groups_of(suites: Sequence[str], axes: Axes) -> list[Group]:
                 shown[contender] = tuple(dict.fromkeys((*shown.get(contender, ()), *of)))
             if shown:
                 found[group.key] = replace(known, contenders=shown)
+    for source in dict.fromkeys(group.scene for group in found.values()):
+        _check_builtin(source)
     scenes = list(dict.fromkeys(family(s) for s in axes.scenes))
     return sorted(found.values(), key=lambda group: scenes.index(family(group.scene)))
+
+
+def _check_builtin(source: str) -> None:
+    if source.startswith(PREFIX):
+        try:
+            parse_builtin(source)
+        except SceneError as error:
+            raise SceneError(f"scene '{source}': {error}") from None
 
 
 def family(source: str) -> str:
