@@ -34,6 +34,7 @@ IDEAS: dict[str, dict[str, Any]] = {
     "lod long-axis": {"lod": "long-axis"},
     "lod multiview": {"lod": "multiview"},
     "weave linear": {"weave": "linear"},
+    "continuous angles": {"views": "continuous"},
 }
 
 

@@ -21,7 +21,7 @@ _FRAME_S = {
 _APPLICATIONS_S = {"ids": (0.3, 4.0), "g-buffers": (2.0, 5.0), "shadow maps": (0.3, 3.0)}
 _ROW_S = 2.0  # to upload, compile and judge
 _STANDARD_S = 4.0  # of a view
-_GOLD_S = 60.0
+_GOLD_S = 12.0  # of 96 views of 960 × 540
 _FILE_MTRIS = 0.5  # of a scene whose file has not been looked at
 _HARDWARE = 0.01  # of the same frames
 
@@ -34,8 +34,8 @@ def seconds(group: Group, effort: Effort, device: Device, *, cores: int) -> floa
         if group.application
         else _STANDARD_S * effort.compared * (effort.samples / 8) ** 2 / speed
     )
-    if effort.gold_size and "aa" in group.suites:
-        spent += _GOLD_S / speed
+    if effort.gold_size and group.suites & {"aa", "ideas"}:
+        spent += _GOLD_S * effort.gold_size[0] * effort.gold_size[1] / (960 * 540) / speed
     for contender in group.contenders:
         if contender.technique != BEST_MVR and contender.problem(device, group.eyes):
             continue

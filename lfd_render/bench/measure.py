@@ -13,6 +13,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from hashlib import sha256
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -24,10 +26,12 @@ from lfd_render.bench.contenders import Contender
 from lfd_render.bench.gold import LEAST_SEEN, alone, chosen_views, gold_standard
 from lfd_render.bench.rivals import RIVALS, Outside
 from lfd_render.bench.suites import Group
+from lfd_render.bench.sweep import Sweep, make_sweep, sweep_errors
 from lfd_render.display import Camera, DisplayProfile
 from lfd_render.errors import GpuError, LfdError, ResourceError, UsageError
 from lfd_render.gpu.device import Device
 from lfd_render.panel.eia import Eia
+from lfd_render.panel.picture import read_picture, write_png
 from lfd_render.quality import rmse, ssim_luma
 from lfd_render.renderer import Renderer, Stage, camera_for, upright_size
 from lfd_render.renderer.stage import REPEAT_TURN_RAD
@@ -47,14 +51,15 @@ _POINT_STAGES = ("transform", "sample")
 class Effort:
     """How much is done. A contender gets as many counted frames as take `row_s` seconds, but from
     `least` to `rounds` of them, after a frame from elsewhere; in the ranking one. compared: views
-    of the standard, with samples × samples a pixel; gold_size: pixels of the panel image's
-    standard's views, None: none is made."""
+    of the standard, with samples × samples a pixel; swept: eyes of a sweep; gold_size: pixels of
+    the panel image's standard's views, None: none is made."""
 
     rounds: int = 15
     least: int = 3
     row_s: float = 6.0
     compared: int = 3
     samples: int = 8
+    swept: int = 9
     gold_views: int = 96
     gold_size: tuple[int, int] | None = (960, 540)
 
@@ -71,7 +76,7 @@ class Row:
     fault: what is wrong with its picture. Times in ms, cpu: the processor time of this process;
     memory in bytes; eia: against the panel image's standard, view: against single views' as an eye
     sees them, RMSE in levels of 255; differs: share of pixels in which an application's buffers are
-    nobody else's."""
+    nobody else's; sweep: as `bench.sweep` has it."""
 
     group: str
     suites: tuple[str, ...]
@@ -98,6 +103,8 @@ class Row:
     view_ssim: float | None = None
     detail: float | None = None
     differs: float | None = None
+    sweep_flip: float | None = None
+    sweep_change: float | None = None
     eia_rmse: float | None = None
     eia_ssim: float | None = None
 
@@ -180,13 +187,21 @@ class Bench:
     """
 
     def __init__(
-        self, device: Device, display: DisplayProfile, effort: Effort, told: Told = lambda _: None
+        self,
+        device: Device,
+        display: DisplayProfile,
+        effort: Effort,
+        told: Told = lambda _: None,
+        keep: Path | None = None,
     ) -> None:
-        """told: what is being done now, in a few words."""
+        """told: what is being done now, in a few words; keep: a folder for panel images that
+        others are judged by, which take long to make."""
+        self._keep = keep
         self._device, self._display, self._effort, self._told = device, display, effort, told
         self._scene: tuple[str, Scene] | None = None
         self._standards: dict[tuple[str, int, tuple[int, int]], Standard] = {}
         self._gold: dict[str, Pixels] = {}
+        self._sweep: tuple[str, Sweep] | None = None
 
     def rows(self, group: Group) -> list[Row]:
         """Measure one group. What a contender cannot do is said in its row. Raises LfdError where
@@ -296,17 +311,47 @@ class Bench:
     def _gold_eia(self, group: Group, scene: Scene, camera: Camera) -> Pixels | None:
         """The panel image's standard for the suites that tell of it."""
         size = self._effort.gold_size
-        if size is None or not group.suites & {"aa", "supersample", "error", "ideas"}:
+        if size is None or not group.suites & {"aa", "supersample", "error", "ideas", "sweep"}:
             return None
         if group.scene not in self._gold:
             self._told(f"{group.scene}: standard of the panel image")
-            with Renderer(self._device) as judge:
-                eia = judge.render(
-                    scene, self._display, camera, self._effort.gold_views, view_size=size,
-                    preset="gold", linear=False,
-                )  # fmt: skip
-            self._gold[group.scene] = eia.pixels
+            self._gold[group.scene] = self._kept_gold(group.scene, scene, camera, size)
         return self._gold[group.scene]
+
+    def _kept_gold(
+        self, source: str, scene: Scene, camera: Camera, size: tuple[int, int]
+    ) -> Pixels:
+        """GStd by rasterisation, as the paper has it, written so that it is made once."""
+        views = self._effort.gold_views
+        made_of = f"{self._display.hash} {source} {views} {size}"
+        path = self._keep and self._keep / f"gold-{sha256(made_of.encode()).hexdigest()[:12]}.png"
+        if path and path.exists():
+            return read_picture(path)
+        # Ids tell the nearest layer alone, so what is seen through another is shaded pass by pass.
+        blends = any(material.alpha_mode == "blend" for material in scene.materials)
+        with Renderer(self._device) as judge:
+            eia = judge.render(
+                scene, self._display, camera, views, view_size=size, preset="gold", linear=False,
+                technique="mvr", mvr="multipass" if blends else "multipass-deferred",
+            )  # fmt: skip
+        if path:
+            write_png(path, eia.pixels)
+        return eia.pixels
+
+    def _swept(self, group: Group, camera: Camera) -> Sweep:
+        if self._sweep is None or self._sweep[0] != group.scene:
+            self._told(f"{group.scene}: standard of a sweep")
+            with Renderer(self._device) as judge:
+                size = group.view_size or upright_size(self._display, group.views)
+                sweep = make_sweep(
+                    self._display, self._effort.swept,
+                    lambda rig: gold_standard(
+                        judge, self._load(group.scene), self._display, camera, eye=rig,
+                        view_size=size, samples=self._effort.samples,
+                    ),
+                )  # fmt: skip
+            self._sweep = group.scene, sweep
+        return self._sweep[1]
 
     def _row(
         self, group: Group, scene: Scene, contender: Contender, suites: tuple[str, ...]
@@ -339,8 +384,9 @@ class Bench:
         with _naming_gaps(row):
             begun = time.perf_counter()
             stage = renderer.stage(
-                scene, self._display, camera, group.views, supersample=group.supersample,
-                view_size=group.view_size, **contender.options,
+                scene, self._display, camera,
+                **{"views": group.views, "supersample": group.supersample,
+                   "view_size": group.view_size, **contender.options},
             )  # fmt: skip
             row.compile_ms = 1000 * (time.perf_counter() - begun)
             peak = ledger.peak
@@ -402,6 +448,10 @@ class Bench:
             row.stages_ms = _stages(eia.report["timings_ms"])
             if gold is not None:
                 row.eia_rmse, row.eia_ssim = rmse(gold, eia.pixels), ssim_luma(gold, eia.pixels)
+            if "sweep" in row.suites:
+                row.sweep_flip, row.sweep_change = sweep_errors(
+                    eia.pixels, self._display, self._swept(group, camera)
+                )
 
     def _run(self, group: Group, running: list[_Running], camera: Camera) -> None:
         """A B A B: as many rounds as the slowest has frames, all contenders in each, those that

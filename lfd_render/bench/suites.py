@@ -246,9 +246,24 @@ def _applications(axes: Axes) -> list[Group]:
 
 def _ideas(axes: Axes) -> list[Group]:
     """LFDPR's default, each of its ideas changed, the paper's preset and plain rasterisation."""
-    contenders = [Contender("lfdpr"), *(Contender("lfdpr", idea=idea) for idea in IDEAS),
+    ideas = [Contender("lfdpr", idea=idea) for idea in IDEAS if idea != "continuous angles"]
+    contenders = [Contender("lfdpr"), *ideas,
                   Contender("lfdpr:paper"), Contender(PLAIN_MVR)]  # fmt: skip
     return [_group(axes, "ideas", _main(axes, s), contenders) for s in axes.scenes]
+
+
+def _sweep(axes: Axes) -> list[Group]:
+    """What filters, supersamples and continuous angles are worth to an eye that moves."""
+    plain = [Contender("lfdpr", aa) for aa in axes.aa]
+    plain += [Contender("lfdpr", idea=idea) for idea in ("weave linear", "continuous angles")]
+    plain.append(Contender(f"{PLAIN_MVR}-deferred"))
+    finer = [Contender("lfdpr"), Contender("lfdpr", "spatial")]
+    return [
+        _group(axes, "sweep", _main(axes, s), plain if times == (1, 1) else finer,
+               supersample=times)
+        for s in axes.scenes
+        for times in ((1, 1), *axes.supersample)
+    ]  # fmt: skip
 
 
 def _rivals(axes: Axes) -> list[Group]:
@@ -269,6 +284,7 @@ SUITES: dict[str, Callable[[Axes], list[Group]]] = {
     "triangles": _triangles,
     "applications": _applications,
     "ideas": _ideas,
+    "sweep": _sweep,
     "rivals": _rivals,
 }
 
@@ -280,7 +296,7 @@ def groups_of(suites: Sequence[str], axes: Axes) -> list[Group]:
     for name in suites:
         if name not in SUITES:
             raise UsageError(f"suite '{name}': unknown; use {', '.join(SUITES)}")
-    if BEST_MVR in axes.techniques and not set(suites) <= {"applications", "ideas"}:
+    if BEST_MVR in axes.techniques and not set(suites) <= {"applications", "ideas", "sweep"}:
         suites = (*suites, RANKING)
     found: dict[str, Group] = {}
     for name in (name for name in SUITES if name in suites):

@@ -222,6 +222,24 @@ def _ideas(found: list[list[Row]]) -> str:
     return "\n".join(lines)
 
 
+def _sweep(found: list[list[Row]]) -> str:
+    """What filters, supersamples and continuous angles buy."""
+    lines = [
+        "| Scene | SS | Method | RMSE of panel image (view) | SSIM (view) | sweep FLIP | "
+        "sweep change | frame, ms |",
+        "|---" * 8 + "|",
+    ]
+    lines += [
+        f"| {scene_name(row)} | {_supersample(row)} | {row.contender} | "
+        f"{_errors(row.eia_rmse, row.view_rmse, 2)} | {_errors(row.eia_ssim, row.view_ssim, 4)} | "
+        f"{row.sweep_flip or 0.0:.4f} | {row.sweep_change or 0.0:.2f} | {_ms(row.median_ms)} |"
+        for rows in found
+        for row in rows
+        if row.valid
+    ]
+    return "\n".join(lines)
+
+
 def _outside(found: list[list[Row]]) -> str:
     """Programs from outside, against LFDPR's whole frame."""
     lines = ["| Scene | Method | frame, ms | of lfdpr's | leaves out |", "|---" * 5 + "|"]
@@ -333,5 +351,6 @@ _TABLES: dict[str, tuple[str, Callable[[list[list[Row]]], str]]] = {
         _applications,
     ),
     "ideas": ("Each idea of LFDPR, on and off", _ideas),
+    "sweep": ("What an eye sees that moves, an eighth of a view interval a frame", _sweep),
     "rivals": ("Programs from outside, same scene, eyes, view size and machine", _outside),
 }

@@ -49,7 +49,8 @@ def bench(
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="mvr, aa, supersample, triangles, views, error, applications, ideas or rivals.",
+            help="mvr, aa, supersample, triangles, views, error; when asked for: applications, "
+            "ideas, sweep, rivals.",
         ),
     ] = None,
     scene: Annotated[
@@ -199,7 +200,7 @@ def _measure(
         if todo:
             say(f"{len(todo)} groups to measure, some {span(left.left_s)} on a quiet machine")
         with _telling(left) as tell:
-            bench = Bench(opened, profile, effort, tell)
+            bench = Bench(opened, profile, effort, tell, keep=folder)
             for group, guess in zip(todo, left.guesses, strict=True):
                 begun = time.monotonic()
                 chosen = group.with_best(_best(results, group, opened))
