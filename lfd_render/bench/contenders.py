@@ -13,7 +13,9 @@ from lfd_render.techniques.mvr import VARIANTS, notation, problem
 ALL_MVR = "mvr:all"
 BEST_MVR = "mvr:best"  # the fastest of the scene's ranking, at most BEST_COUNT of them
 PLAIN_MVR = "mvr:multipass"
-BEST_COUNT, _CLOSE = 2, 1.25  # how much slower than the fastest one may be and still become it
+BEST_COUNT = 2
+RANKED_CLOSE = 1.25  # how much slower than the fastest one may be in a ranking and still become it
+TIMED_CLOSE = 1.05  # and once it is timed with all views
 USUAL = ("lfdpr", "lfdpr:paper", PLAIN_MVR, BEST_MVR)
 _PRESETS = ("default", "paper")
 # Each changes one choice of the default preset (docs/lfdpr.md).
@@ -106,14 +108,16 @@ def techniques(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def fastest(device: Device, times_ms: Mapping[str, float], eyes: int) -> tuple[str, ...]:
-    """Of ranked techniques those that may be the best with so many eyes, fastest first: who is
-    much slower than the first cannot become it."""
+def fastest(
+    device: Device, times_ms: Mapping[str, float], eyes: int, close: float = RANKED_CLOSE
+) -> tuple[str, ...]:
+    """Of techniques those that may be the best with so many eyes, fastest first: who is `close`
+    times slower than the first cannot become it."""
     able = {
         name: ms
         for name, ms in sorted(times_ms.items(), key=lambda item: item[1])
         if Contender(name).problem(device, eyes) is None
     }
     least = min(able.values(), default=0.0)
-    close = [name for name, ms in able.items() if ms <= _CLOSE * least]
-    return tuple(close[:BEST_COUNT]) or (f"{PLAIN_MVR}-deferred",)
+    near = [name for name, ms in able.items() if ms <= close * least]
+    return tuple(near[:BEST_COUNT]) or (f"{PLAIN_MVR}-deferred",)

@@ -218,16 +218,27 @@ def _measure(
 
 
 def _best(results: Results, group: Group, device: Device) -> tuple[str, ...]:
-    """The rasterisers that the ranking of a group's scene found to be the best."""
-    from lfd_render.bench.contenders import fastest  # noqa: PLC0415 (keeps --help quick)
+    """The rasterisers that may be the best of a group's scene: by the filters' table, where it is
+    measured, else by the ranking."""
+    from lfd_render.bench.contenders import (  # noqa: PLC0415 (keeps --help quick)
+        RANKED_CLOSE,
+        TIMED_CLOSE,
+        fastest,
+    )
     from lfd_render.bench.suites import RANKING, family  # noqa: PLC0415
 
-    times = {
-        row.technique: row.median_ms
-        for row in results.rows
-        if RANKING in row.suites and row.valid and family(row.scene) == family(group.scene)
-    }
-    return fastest(device, times, group.eyes)
+    for suite, close in (("aa", TIMED_CLOSE), (RANKING, RANKED_CLOSE)):
+        times = {
+            row.technique: row.median_ms
+            for row in results.rows
+            if suite in row.suites
+            and row.valid
+            and row.rasterises
+            and family(row.scene) == family(group.scene)
+        }
+        if times:
+            return fastest(device, times, group.eyes, close)
+    return fastest(device, {}, group.eyes)
 
 
 @contextmanager

@@ -96,3 +96,26 @@ def test_other_settings_and_bad_options_are_named(
         assert result.code in (2, 3)
         assert message in result.error
         assert not (tmp_path / "other").exists()
+
+
+def test_the_best_of_the_ranking_is_narrowed_by_the_filters_table(
+    command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ms = {"mvr:loop-4-deferred": 40.0, "mvr:multipass-deferred": 45.0}
+    asked: list[set[str]] = []
+
+    def rows(self: Bench, group: Group) -> list[Row]:
+        asked.append({c.technique for c in group.contenders if c.rasterises})
+        found = measured(group)
+        for row in found:
+            row.frames_ms = [ms.get(row.technique, 90.0)] * 3
+        return found
+
+    monkeypatch.setattr(Bench, "rows", rows)
+    options = ("--suite", "aa", "--suite", "views", "--scene", "builtin:car", "--aa", "none",
+               "--technique", "lfdpr", "--technique", "mvr:best", "--views", 96)  # fmt: skip
+    assert command("bench", tmp_path / "bench", *options).code == 0
+    ranking, filters, views = asked
+    assert ranking > set(ms)
+    assert filters == set(ms)  # within a quarter of each other
+    assert views == {"mvr:loop-4-deferred"}  # more than a twentieth apart

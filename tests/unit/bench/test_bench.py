@@ -112,6 +112,7 @@ def test_the_ranking_keeps_what_may_be_the_best(monkeypatch: pytest.MonkeyPatch)
         "mvr:instanced-4-deferred",
     )
     assert fastest(device, {"mvr:multipass": 20, "mvr:loop-4": 30}, 48) == ("mvr:multipass",)
+    assert fastest(device, ms, 48, close=1.05) == ("mvr:loop-4-deferred",)
     assert fastest(device, {}, 48) == ("mvr:multipass-deferred",)
 
 
