@@ -82,6 +82,9 @@ def test_an_interrupted_render_leaves_nothing(
         assert process.stderr is not None
         assert "warning: display" in process.stderr.readline()
         process.send_signal(number)
-        assert process.wait(timeout=60) == code
-        assert process.stderr.read() in ("", "lfd-render: error: interrupted\n")
+        try:
+            assert process.wait(timeout=60) == code
+            assert process.stderr.read() in ("", "lfd-render: error: interrupted\n")
+        finally:
+            process.kill()  # or one that has not ended would be waited for
     assert list(tmp_path.iterdir()) == []

@@ -180,8 +180,12 @@ def winners(
     technique.render(band, clock)
     assert technique.complete()
     shape = (grid.rows, rig.views, grid.columns)
-    words = technique._views.words.read(np.uint32).reshape(shape)
-    depths = technique._views.depths.read(np.float32).reshape(shape)
+    views = technique._views
+    stride = views.word_stride  # depth follows the word where both are in one buffer
+    words = views.words.read(np.uint32)[::stride].reshape(shape)
+    bits = views.depths.read(np.uint32)[stride - 1 :: stride].reshape(shape)
+    # Nothing is infinitely far, however a layout says it.
+    depths = np.minimum(bits, np.uint32(0x7F800000)).view(np.float32)
     technique.release()
     buffers.release()
     return words, depths
