@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from lfd_render.bench.measure import Row, best_mvr
+from lfd_render.bench.row import Row, best_mvr
 
 MOST_DIFFERENT = 0.10  # of ratios of two runs on a quiet machine
 

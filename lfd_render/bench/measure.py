@@ -8,11 +8,10 @@ nothing left from before can pass; the times of a wrong picture are thrown away.
 from __future__ import annotations
 
 import math
-import statistics
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Protocol
@@ -25,10 +24,11 @@ from lfd_render.bench.check import Standard, Verdict, against_peers, verdict
 from lfd_render.bench.contenders import Contender
 from lfd_render.bench.gold import LEAST_SEEN, alone, chosen_views, gold_standard
 from lfd_render.bench.rivals import RIVALS, Outside
+from lfd_render.bench.row import Row
 from lfd_render.bench.suites import Group
 from lfd_render.bench.sweep import Sweep, make_sweep, sweep_errors
 from lfd_render.display import Camera, DisplayProfile
-from lfd_render.errors import GpuError, LfdError, ResourceError, UsageError
+from lfd_render.errors import GpuError, ResourceError, UsageError
 from lfd_render.gpu.device import Device
 from lfd_render.panel.eia import Eia
 from lfd_render.panel.picture import read_picture, write_png
@@ -43,8 +43,6 @@ _ELSEWHERE_RAD = 0.35  # how far the frame before the one that is judged is turn
 _HOPELESS = 2.0  # times as slow as the fastest of a ranking so far
 _MOST_DIFFERENT = 0.02  # of buffers' pixels; on edges points and rasterisation may differ
 _MOST_MISSED = 0.05  # of what a standard shows; its edges are finer than a rival's
-_PANEL_STAGES = ("average", "encode_srgb", "weave")
-_POINT_STAGES = ("transform", "sample")
 
 
 @dataclass(frozen=True)
@@ -68,81 +66,6 @@ class Effort:
         least = min(self.least, self.rounds)
         wanted = int(1000.0 * self.row_s / max(ms, 1e-3))
         return 1 if ranks else max(least, min(wanted, self.rounds))
-
-
-@dataclass
-class Row:
-    """What one contender did in a group. suites: that show it; gap: why there is nothing, or None;
-    fault: what is wrong with its picture. Times in ms, cpu: the processor time of this process;
-    memory in bytes; eia: against the panel image's standard, view: against single views' as an eye
-    sees them, RMSE in levels of 255; differs: share of pixels in which an application's buffers are
-    nobody else's; sweep: as `bench.sweep` has it."""
-
-    group: str
-    suites: tuple[str, ...]
-    scene: str
-    triangles: int
-    views: int
-    supersample: tuple[int, int]
-    contender: str
-    technique: str
-    aa: str
-    application: str = ""
-    notation: str = ""
-    gap: str | None = None
-    fault: str | None = None
-    frames_ms: list[float] = field(default_factory=list)
-    cpu_ms: list[float] = field(default_factory=list)
-    stages_ms: dict[str, float] = field(default_factory=dict)
-    leaves_out: str = ""
-    compile_ms: float = 0.0
-    points: int = 0
-    device_bytes: int = 0
-    view_size: tuple[int, int] = (0, 0)
-    view_rmse: float | None = None
-    view_ssim: float | None = None
-    detail: float | None = None
-    differs: float | None = None
-    sweep_flip: float | None = None
-    sweep_change: float | None = None
-    eia_rmse: float | None = None
-    eia_ssim: float | None = None
-
-    @property
-    def rasterises(self) -> bool:
-        """Whether it is multi-view rasterisation."""
-        return self.technique.startswith("mvr")
-
-    @property
-    def valid(self) -> bool:
-        """Whether its time counts."""
-        return self.gap is None and self.fault is None and bool(self.frames_ms)
-
-    @property
-    def median_ms(self) -> float:
-        """Of the counted frames."""
-        return statistics.median(self.frames_ms)
-
-    @property
-    def median_cpu_ms(self) -> float:
-        """Of the counted frames' processor time, 0 where it is not known."""
-        return statistics.median(self.cpu_ms) if self.cpu_ms else 0.0
-
-    @property
-    def spread(self) -> float:
-        """Half the interquartile range over the median."""
-        if len(self.frames_ms) < 2:
-            return 0.0
-        low, _, high = statistics.quantiles(self.frames_ms, n=4, method="inclusive")
-        return 0.5 * (high - low) / self.median_ms
-
-    def stage_ms(self, kind: str) -> float:
-        """Of the median frame: ``points`` (0 for rasterisers), ``views`` or ``eia``."""
-        parts = {"points": 0.0, "views": 0.0, "eia": 0.0}
-        for name, ms in self.stages_ms.items():
-            points = name in _POINT_STAGES and not self.rasterises
-            parts["points" if points else "eia" if name in _PANEL_STAGES else "views"] += ms
-        return parts[kind]
 
 
 @contextmanager
@@ -217,7 +140,7 @@ class Bench:
         running: list[_Running] = []
         try:
             for contender, suites in group.contenders.items():
-                row = self._row(group, scene, contender, suites)
+                row = Row.of(group, contender, suites, triangles=scene.triangle_count)
                 rows.append(row)
                 self._told(f"{group.scene}: preparing {row.contender}")
                 start = self._start_outside if contender.technique in RIVALS else self._start
@@ -253,7 +176,7 @@ class Bench:
         assert group.view_size is not None
         try:
             for contender, suites in group.contenders.items():
-                row = self._row(group, scene, contender, suites)
+                row = Row.of(group, contender, suites, triangles=scene.triangle_count)
                 rows.append(row)
                 row.gap = contender.problem(self._device, group.views)
                 if row.gap:
@@ -352,16 +275,6 @@ class Bench:
                 )  # fmt: skip
             self._sweep = group.scene, sweep
         return self._sweep[1]
-
-    def _row(
-        self, group: Group, scene: Scene, contender: Contender, suites: tuple[str, ...]
-    ) -> Row:
-        return Row(
-            group=group.key, suites=suites, scene=group.scene, triangles=scene.triangle_count,
-            views=group.views, supersample=group.supersample, contender=contender.name,
-            technique=contender.technique, aa=contender.aa, application=contender.application,
-            notation=contender.notation,
-        )  # fmt: skip
 
     def _start(
         self,
@@ -526,23 +439,3 @@ def _judge_together(running: list[_Running]) -> None:
         row.detail = final.detail
         if row.fault:
             _throw_away(row)
-
-
-def unmeasured(group: Group, error: LfdError | MemoryError) -> list[Row]:
-    """Rows of a group that nobody could do."""
-    return [
-        Row(
-            group=group.key, suites=suites, scene=group.scene, triangles=0, views=group.views,
-            supersample=group.supersample, contender=contender.name,
-            technique=contender.technique, aa=contender.aa, application=contender.application,
-            notation=contender.notation,
-            gap=str(error) or type(error).__name__,
-        )
-        for contender, suites in group.contenders.items()
-    ]  # fmt: skip
-
-
-def best_mvr(rows: list[Row]) -> Row | None:
-    """The rasteriser of a group that counts: the fastest whose picture is right."""
-    rivals = [row for row in rows if row.rasterises and row.valid]
-    return min(rivals, key=lambda row: row.median_ms, default=None)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from lfd_render.bench.measure import Row
+from lfd_render.bench.row import Row
 from lfd_render.bench.tables import scene_name
 from lfd_render.display.files import replacing
 from lfd_render.errors import UsageError

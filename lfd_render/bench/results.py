@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lfd_render.bench.measure import Row
+from lfd_render.bench.row import Row
 from lfd_render.display.files import replacing
 from lfd_render.errors import OutputError, UsageError
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from lfd_render.bench.contenders import PLAIN_MVR
-from lfd_render.bench.measure import Row, best_mvr
 from lfd_render.bench.papers import CATALOGUE, TABLE_1, TABLE_2, Printed
+from lfd_render.bench.row import Row, best_mvr
 from lfd_render.bench.suites import SCENES
 
 _NOTABLE = 1.1
@@ -79,6 +79,12 @@ def ratio(row: Row, best: Row | None) -> str:
 
 def _ms(value: float) -> str:
     return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}"
+
+
+def _quality(row: Row) -> str:
+    """Two cells: RMSE and SSIM, each of the panel image and of a view."""
+    rmse = _errors(row.eia_rmse, row.view_rmse, 2)
+    return f"{rmse} | {_errors(row.eia_ssim, row.view_ssim, 4)}"
 
 
 def _errors(whole: float | None, view: float | None, digits: int) -> str:
@@ -192,8 +198,7 @@ def _by_size(found: list[list[Row]]) -> str:
             f"| {scene_name(row)} | {row.view_size[0]} × {row.view_size[1]} | "
             f"{_supersample(row)} | {row.contender} | "
             f"{_ms(row.median_ms)} | {ratio(row, best)} | "
-            f"{_errors(row.eia_rmse, row.view_rmse, 2)} | "
-            f"{_errors(row.eia_ssim, row.view_ssim, 4)} |"
+            f"{_quality(row)} |"
             for row in rows
             if row.valid
         ]
@@ -216,8 +221,7 @@ def _ideas(found: list[list[Row]]) -> str:
                 lines.append(
                     f"| {scene_name(row)} | {row.contender} | {points} | "
                     f"{_ms(row.median_ms)} ± {100 * row.spread:.0f} % | {share} | "
-                    f"{_errors(row.eia_rmse, row.view_rmse, 2)} | "
-                    f"{_errors(row.eia_ssim, row.view_ssim, 4)} |"
+                    f"{_quality(row)} |"
                 )
     return "\n".join(lines)
 
@@ -231,7 +235,7 @@ def _sweep(found: list[list[Row]]) -> str:
     ]
     lines += [
         f"| {scene_name(row)} | {_supersample(row)} | {row.contender} | "
-        f"{_errors(row.eia_rmse, row.view_rmse, 2)} | {_errors(row.eia_ssim, row.view_ssim, 4)} | "
+        f"{_quality(row)} | "
         f"{row.sweep_flip or 0.0:.4f} | {row.sweep_change or 0.0:.2f} | {_ms(row.median_ms)} |"
         for rows in found
         for row in rows

@@ -21,8 +21,9 @@ from lfd_render.errors import EXIT_INTERRUPTED, LfdError, UsageError
 
 if TYPE_CHECKING:
     from lfd_render.bench.estimate import Progress
-    from lfd_render.bench.measure import Effort, Row
+    from lfd_render.bench.measure import Effort
     from lfd_render.bench.results import Results
+    from lfd_render.bench.row import Row
     from lfd_render.bench.suites import Axes, Group
     from lfd_render.display import DisplayProfile
     from lfd_render.gpu.device import Device
@@ -181,8 +182,9 @@ def _measure(
     """Measure what is missing; whether someone stopped it."""
     from lfd_render.bench.estimate import Progress, seconds, span  # noqa: PLC0415 (quick --help)
     from lfd_render.bench.machine import describe  # noqa: PLC0415
-    from lfd_render.bench.measure import Bench, unmeasured  # noqa: PLC0415
+    from lfd_render.bench.measure import Bench  # noqa: PLC0415
     from lfd_render.bench.results import Results  # noqa: PLC0415
+    from lfd_render.bench.row import unmeasured  # noqa: PLC0415
     from lfd_render.gpu.device import Device  # noqa: PLC0415
 
     opened = Device.open(device)
@@ -293,7 +295,7 @@ def _write(folder: Path, results: Results) -> str:
 
 def _summary(results: Results) -> dict[str, Any]:
     """Rows with their medians, and the ratio to the best rasteriser of each group."""
-    from lfd_render.bench.measure import best_mvr  # noqa: PLC0415 (keeps --help quick)
+    from lfd_render.bench.row import best_mvr  # noqa: PLC0415 (keeps --help quick)
 
     found = []
     for rows in results.groups.values():

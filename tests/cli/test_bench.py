@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from lfd_render.bench.measure import Bench, Row
+from lfd_render.bench.measure import Bench
+from lfd_render.bench.row import Row
 from lfd_render.bench.suites import Group
 from lfd_render.errors import SceneError
 

@@ -8,7 +8,8 @@ import pytest
 from lfd_render.bench import measure
 from lfd_render.bench.applications import APPLICATIONS
 from lfd_render.bench.contenders import Contender
-from lfd_render.bench.measure import Bench, Effort, Row, best_mvr
+from lfd_render.bench.measure import Bench, Effort
+from lfd_render.bench.row import Row, best_mvr
 from lfd_render.bench.suites import Group
 from lfd_render.display import DisplayProfile
 from lfd_render.errors import ResourceError

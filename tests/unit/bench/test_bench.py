@@ -16,10 +16,11 @@ from lfd_render.bench.applications import differ
 from lfd_render.bench.check import Verdict, against_peers, detail_share, stray_view
 from lfd_render.bench.contenders import USUAL, Contender, fastest, techniques
 from lfd_render.bench.estimate import Progress, span
-from lfd_render.bench.measure import Effort, Row, best_mvr
+from lfd_render.bench.measure import Effort
 from lfd_render.bench.papers import TABLE_1, TABLE_2
 from lfd_render.bench.plots import write_plots
 from lfd_render.bench.results import LINES, Results, read_groups
+from lfd_render.bench.row import Row, best_mvr
 from lfd_render.bench.suites import SUITES, Axes, groups_of, scene_source
 from lfd_render.bench.tables import report
 from lfd_render.display import DisplayProfile, Rig
