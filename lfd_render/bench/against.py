@@ -27,7 +27,7 @@ def compare(
             other = there.get(row.contender)
             if not row.valid or other is None or row is best:
                 continue
-            ratios = best.median_ms / row.median_ms, base.median_ms / other.median_ms
+            ratios = row.times_faster(best), other.times_faster(base)
             entry = {
                 "group": key, "contender": row.contender, "best_mvr": best.contender,
                 "ratio": round(ratios[0], 4), "other_ratio": round(ratios[1], 4),
@@ -35,14 +35,11 @@ def compare(
                 "frames": [len(row.frames_ms), len(other.frames_ms)],
                 "same_best": best_mvr(list(others[key])) is base,
             }  # fmt: skip
-            if all(r.median_cpu_ms for r in (best, row, base, other)):
-                cpu = (
-                    best.median_cpu_ms / row.median_cpu_ms,
-                    base.median_cpu_ms / other.median_cpu_ms,
-                )
+            cpu = row.times_faster_by_cpu(best), other.times_faster_by_cpu(base)
+            if cpu[0] and cpu[1]:
                 entry |= {
                     "cpu_ratio": round(cpu[0], 4), "other_cpu_ratio": round(cpu[1], 4),
-                    "cpu_differ": round(max(cpu) / min(cpu) - 1, 4),
+                    "cpu_differ": round(max(cpu[0] / cpu[1], cpu[1] / cpu[0]) - 1, 4),
                 }  # fmt: skip
             found.append(entry)
     return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import statistics
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from lfd_render.bench.contenders import Contender
@@ -88,6 +89,16 @@ class Row:
         """Of the counted frames' processor time, 0 where it is not known."""
         return statistics.median(self.cpu_ms) if self.cpu_ms else 0.0
 
+    def times_faster(self, other: Row) -> float:
+        """The other's time over its own."""
+        return _ratio(other.frames_ms, self.frames_ms)
+
+    def times_faster_by_cpu(self, other: Row) -> float | None:
+        """The same of processor time; None where one's is not known."""
+        if not (self.median_cpu_ms and other.median_cpu_ms):
+            return None
+        return _ratio(other.cpu_ms, self.cpu_ms)
+
     @property
     def spread(self) -> float:
         """Half the interquartile range over the median."""
@@ -103,6 +114,18 @@ class Row:
             points = name in _POINT_STAGES and not self.rasterises
             parts["points" if points else "eia" if name in _PANEL_STAGES else "views"] += ms
         return parts[kind]
+
+
+def _ratio(above: Sequence[float], below: Sequence[float]) -> float:
+    """Median over rounds of one's time over the other's in the same round, which leaves out what
+    slows a machine for longer than a round. Who has more frames has several in each."""
+    rounds = min(len(above), len(below))
+
+    def of_round(times: Sequence[float], index: int) -> float:
+        first, end = (len(times) * (index + n) // rounds for n in (0, 1))
+        return statistics.median(times[first:end])
+
+    return statistics.median(of_round(above, n) / of_round(below, n) for n in range(rounds))
 
 
 def unmeasured(group: Group, error: LfdError | MemoryError) -> list[Row]:

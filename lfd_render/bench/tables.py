@@ -42,9 +42,9 @@ def _head(settings: Mapping[str, Any]) -> str:
         f"Medians of {min(effort['least'], effort['rounds'])} to {effort['rounds']} frames of a "
         "turning scene, as many as a row's time allows; all rows of a group in turn; ± half the "
         "interquartile range. Times are wall clock between finishes. × is the time of the best "
-        "multi-view rasterisation of the group over the row's: more than 1 is faster than it; by "
-        "processor time it follows in brackets where that differs by a tenth. One of the frames "
-        "timed is the picture that was checked."
+        "multi-view rasterisation of the group over the row's in the same round, the median of all "
+        "rounds: more than 1 is faster than it; by processor time it follows in brackets where "
+        "that differs by a tenth. One of the frames timed is the picture that was checked."
     )
 
 
@@ -69,11 +69,10 @@ def ratio(row: Row, best: Row | None) -> str:
     """The best rasteriser's time over a row's, and by processor time where that says otherwise."""
     if not best or not row.valid:
         return ""
-    text = f"{best.median_ms / row.median_ms:.2f} ×"
-    if best.median_cpu_ms and row.median_cpu_ms:
-        cpu = best.median_cpu_ms / row.median_cpu_ms
-        wall = best.median_ms / row.median_ms
-        text += f" [{cpu:.2f} ×]" if max(cpu, wall) > _NOTABLE * min(cpu, wall) else ""
+    wall, cpu = row.times_faster(best), row.times_faster_by_cpu(best)
+    text = f"{wall:.2f} ×"
+    if cpu and max(cpu, wall) > _NOTABLE * min(cpu, wall):
+        text += f" [{cpu:.2f} ×]"
     return text
 
 

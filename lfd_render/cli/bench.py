@@ -141,7 +141,8 @@ def bench(
     )
     default_effort = Effort()
     effort = Effort(
-        rounds=rounds or (3 if quick else default_effort.rounds),
+        rounds=rounds or default_effort.rounds,
+        least=5 if quick else default_effort.least,
         row_s=default_effort.row_s if row_seconds is None else row_seconds,
         compared=1 if quick else default_effort.compared,
         samples=samples or (4 if quick else default_effort.samples),
@@ -309,9 +310,9 @@ def _row(row: Row, best: Row | None) -> dict[str, Any]:
     if row.valid:
         data |= {"median_ms": row.median_ms, "spread": round(row.spread, 4)}
     if row.valid and best:
-        data |= {"best_mvr": best.technique, "ratio": round(best.median_ms / row.median_ms, 4)}
-        if row.median_cpu_ms and best.median_cpu_ms:
-            data["cpu_ratio"] = round(best.median_cpu_ms / row.median_cpu_ms, 4)
+        data |= {"best_mvr": best.technique, "ratio": round(row.times_faster(best), 4)}
+        if cpu := row.times_faster_by_cpu(best):
+            data["cpu_ratio"] = round(cpu, 4)
     return data
 
 

@@ -126,6 +126,17 @@ def test_time_left_follows_what_was_spent() -> None:
     assert (span(40), span(3900)) == ("40 s", "1 h 05 min")
 
 
+def test_ratios_are_those_of_rounds() -> None:
+    slow, fast = row("mvr:loop-4", 0.0), row("lfdpr", 0.0)
+    # The machine slows down: medians of all, 200 and 25, would say 8.
+    slow.frames_ms, fast.frames_ms = [100.0, 200.0, 300.0], [10.0, 10.0, 20.0, 30.0, 30.0, 30.0]
+    assert fast.times_faster(slow) == 10.0
+    assert slow.times_faster(fast) == 0.1
+    assert fast.times_faster_by_cpu(slow) is None
+    slow.cpu_ms, fast.cpu_ms = [30.0], [10.0]
+    assert fast.times_faster_by_cpu(slow) == 3.0
+
+
 def test_two_runs_ratios_are_compared_by_the_same_rasteriser(tmp_path: Path) -> None:
     here = [row("lfdpr", 10.0), row("mvr:loop-4", 40.0), row("mvr:multipass", 44.0)]
     there = [row("lfdpr", 10.0), row("mvr:loop-4", 46.0), row("mvr:multipass", 45.0)]
