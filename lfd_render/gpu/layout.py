@@ -28,7 +28,8 @@ TEXTURE_ROLES = ("base_color", "metallic_roughness", "normal", "occlusion", "emi
 LOD_RULES = ("none", "area", "long-axis", "multiview", "anisotropic")
 
 STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
-    # One mesh placed in the world. Normals go by the inverse transpose, kept as three columns.
+    # One mesh placed in the world (read by common/draws.glsl). Normals go by the inverse transpose,
+    # kept as three columns.
     "Draw": (
         ("mat4", "display_from_local"),
         ("vec4", "normal_matrix_x"),
@@ -68,18 +69,23 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("uint", "color_rg"),  # 2 × unorm16, linear
         ("uint", "color_ba"),
     ),
-    # Factors of a material, packed because software devices load word by word, lane by lane.
+    # A material's factors and texture slots, packed by what is read together.
     "Material": (
         ("uint", "base_color_rg"),  # 2 × unorm16, linear
         ("uint", "base_color_ba"),
-        ("uint", "emissive_rg"),  # 2 × half
-        ("uint", "emissive_b_cutoff"),  # 2 × half: blue, alpha cutoff
         ("uint", "metallic_roughness"),  # 2 × unorm16
         ("uint", "normal_occlusion"),  # 2 × half: normal scale, occlusion strength
+        ("uint", "emissive_rg"),  # 2 × half
+        ("uint", "emissive_b_cutoff"),  # 2 × half: blue, alpha cutoff
         ("uint", "flags"),  # UNLIT
+        ("uint", "emissive_slot"),
+        ("uint", "base_color_slot"),
+        ("uint", "metallic_roughness_slot"),
+        ("uint", "normal_slot"),
+        ("uint", "occlusion_slot"),
         # Most texels any texture lays on a unit of texture area, by coordinate set (equation 1).
-        ("float", "texels_uv0"),
-        ("float", "texels_uv1"),
+        ("vec2", "texels"),
+        ("vec2", "unused"),
     ),
     # KHR_texture_transform of a slot: columns of the 2×2 part, and the offset.
     "UvTransform": (
@@ -206,6 +212,14 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("uint", "cells"),
         ("uint", "most_cells"),
     ),
+    # A block of columns to shade: row of the band << 22 | view << 12 | block of the row; its view's
+    # eye and how far that row is moved, in columns.
+    "Block": (
+        ("uint", "place"),
+        ("float", "eye"),
+        ("float", "row_offset"),
+        ("uint", "unused"),
+    ),
     # Counts of the list of blocks to shade: the first three words dispatch.
     "BlockWork": (
         ("uint", "groups_x"),
@@ -222,7 +236,6 @@ CONSTANTS: dict[str, int] = {
     "NO_TRIANGLE": 0xFFFFFFFF,  # the word of a view pixel that shows the background
     "DOUBLE_SIDED": 1 << 16,
     "MOST_CELLS": 2048,  # of a triangle's lattice along a side, as the point-sampling view is large
-    "TRACK_WORD": 1 << 31,  # bit: the word of a view pixel names a slice track
     "STEPS_SHIFT": 10,
     "MOST_STEPS": 4096,  # between cells of a track, more than a window's columns
     "UNLIT": 1,  # flag of a material

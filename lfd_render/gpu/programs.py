@@ -1,4 +1,7 @@
-"""Compiled shaders: storage blocks, uniforms and samplers are set by name, a wrong name raises."""
+"""Compiled shaders: storage blocks, uniforms and samplers are set by name, a wrong name raises.
+
+A buffer is bound as the shader declares its name: a storage or uniform block, or a usamplerBuffer.
+"""
 
 from __future__ import annotations
 
@@ -72,6 +75,7 @@ class _Program(Owned):
                 buffer.glo.bind_to_storage_buffer(binding)
             else:
                 buffer.glo.bind_to_uniform_block(binding)
+        self._set_samplers({**(samplers or {}), **buffers})
         for name, value in (uniforms or {}).items():
             if name not in self._uniforms:
                 continue
@@ -80,7 +84,6 @@ class _Program(Owned):
                 uniform.write(value)
             else:
                 uniform.value = value
-        self._set_samplers(samplers or {})
 
     def change(self, name: str, value: int | float) -> None:
         """Set a uniform once more; what else was set stays. Unused ones may be given."""

@@ -121,13 +121,13 @@ class Batch:
             row = end
         attributes = [part.attributes for part in in_order]
         self.local_positions = Buffer.of(device, "positions", positions)
-        self.display_positions = Buffer(device, "display positions", positions.nbytes)
+        self.display_vertices = Buffer(device, "display vertices", positions.nbytes)
         normals = np.concatenate([a.normals for a in attributes])
         self.local_normals = Buffer.of(device, "normals", normals)
-        self.world_normals = Buffer(device, "normals", normals.nbytes)
-        self.uv0 = Buffer.of(
-            device, "texture coordinates", np.concatenate([a.uv0 for a in attributes])
-        )
+        uv0 = [a.uv0 for a in attributes]
+        if self.vertices % 2:  # shaders fetch those of two vertices at a time
+            uv0.append(np.zeros((1, 2), np.float32))
+        self.uv0 = Buffer.of(device, "texture coordinates", np.concatenate(uv0))
         self.extras = Buffer.of(
             device, "vertex extras", np.concatenate([a.extras for a in attributes])
         )
@@ -147,7 +147,7 @@ class Batch:
 
     def geometry(self) -> dict[str, Buffer]:
         """What visibility reads, by block name (draws are the scene's)."""
-        return {"Triangles": self.corners, "DisplayPositions": self.display_positions}
+        return {"Triangles": self.corners, "DisplayVertices": self.display_vertices}
 
     def attributes(self) -> dict[str, Buffer]:
         """Texture coordinates and colours of vertices, by block name."""
@@ -156,8 +156,8 @@ class Batch:
     def release(self) -> None:
         """Free the batch."""
         for buffer in (
-            self.local_positions, self.display_positions, self.local_normals, self.world_normals,
-            self.uv0, self.extras, self.corners,
+            self.local_positions, self.display_vertices, self.local_normals, self.uv0, self.extras,
+            self.corners,
         ):  # fmt: skip
             buffer.release()
         if self.deform:
@@ -185,8 +185,9 @@ class SceneBuffers:
             self._records["first_joint"] = self.deformation.first_joint
             self._records["first_weight"] = self.deformation.first_weight
         self.draws = Buffer(device, "draws", self._records.nbytes)
-        self.materials = Buffer.of(device, "materials", _material_records(scene))
-        self.slots = Buffer.of(device, "materials", self.textures.slots)
+        self.materials = Buffer.of(
+            device, "materials", _material_records(scene, self.textures.slots)
+        )
         self.uv_transforms = Buffer.of(device, "materials", self.textures.uv_transforms)
         slots = [slot for m in scene.materials for slot in m.texture_slots().values()]
         second_set = any(slot.texcoord == 1 for slot in slots)
@@ -265,7 +266,6 @@ class SceneBuffers:
         """Materials, by block name."""
         return {
             "Materials": self.materials,
-            "TextureSlots": self.slots,
             "UvTransforms": self.uv_transforms,
         }
 
@@ -298,7 +298,7 @@ class SceneBuffers:
         """Free everything."""
         for batch in self.batches:
             batch.release()
-        for buffer in (self.draws, self.materials, self.slots, self.uv_transforms):
+        for buffer in (self.draws, self.materials, self.uv_transforms):
             buffer.release()
         if self.deformation:
             self.deformation.release()
@@ -413,7 +413,8 @@ def _octahedral(normals: NDArray[np.float32]) -> NDArray[np.uint32]:
     return np.ascontiguousarray(words).view(np.uint32)[:, 0]  # x in the low half
 
 
-def _material_records(scene: Scene) -> NDArray[np.void]:
+def _material_records(scene: Scene, slots: NDArray[np.uint32]) -> NDArray[np.void]:
+    """slots: as `MaterialTextures.slots`."""
     materials = scene.materials
     records = np.zeros(len(materials), dtype("Material"))
     color = np.array([m.base_color for m in materials])
@@ -429,8 +430,9 @@ def _material_records(scene: Scene) -> NDArray[np.void]:
     records["metallic_roughness"] = _unorm16x2(surface[:, 0], surface[:, 1])
     records["normal_occlusion"] = _half2(np.array(normal), np.array(occlusion))
     records["flags"] = [CONSTANTS["UNLIT"] if m.unlit else 0 for m in materials]
-    texels = _texels(scene)
-    records["texels_uv0"], records["texels_uv1"] = texels[:, 0], texels[:, 1]
+    records["texels"] = _texels(scene)
+    for role, words in zip(TEXTURE_ROLES, slots.reshape(-1, len(TEXTURE_ROLES)).T, strict=True):
+        records[f"{role}_slot"] = words
     return records
 
 

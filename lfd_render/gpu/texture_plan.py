@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from lfd_render.errors import ResourceError
 from lfd_render.gpu.device import DeviceInfo
 
-RESERVED_UNITS = 3  # view images, the panel image and the environment
+# The environment, a list of cells or the images of a pass, and what geometry and materials are
+# fetched by: triangles, draws, three of vertices, materials.
+RESERVED_UNITS = 8
 _MOST_KINDS = 256  # that are merged pair by pair; more are first brought to steps of sizes
 _GIB = 1 << 30
 

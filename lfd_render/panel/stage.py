@@ -1,8 +1,8 @@
 """The last stages of a frame: bands of view images become the encoded panel image.
 
-Where each subpixel shows one view pixel as it is, views are encoded first and woven as bytes, which
-moves half as much and gives the same codes. Where view pixels are mixed, they are mixed in linear
-light and encoded on the panel, unless asked to be mixed as codes.
+Where each subpixel shows one view pixel as it is, views are encoded first, where they are shaded if
+nothing else is asked of them, and woven as bytes, which moves half as much. Where view pixels are
+mixed, they are mixed in linear light and encoded on the panel, unless asked to be mixed as codes.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from lfd_render.display import DisplayProfile, Reconstruction, ViewGrid
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
 from lfd_render.passes.average import Average
-from lfd_render.passes.encode import Encode, EncodeViews
+from lfd_render.passes.encode import Encode
+from lfd_render.passes.encode_views import EncodeViews
 from lfd_render.passes.view_target import Band, ViewTarget
 from lfd_render.passes.weave import Weave, is_exact
 
@@ -33,6 +34,18 @@ class PanelOptions:
     eyes: int = 1
     light: str = "linear"
     linear: bool = True
+
+
+def codes_first(options: PanelOptions, grid: ViewGrid) -> bool:
+    """Whether views of a grid are encoded before they are woven."""
+    exact = is_exact(options.rule, grid)
+    return options.light == "encoded" or (exact and not options.linear)
+
+
+def codes_alone(options: PanelOptions, grid: ViewGrid, *, times: int) -> bool:
+    """Whether nothing is asked of a grid's views but codes. times: view rows of the target a row of
+    the grid."""
+    return codes_first(options, grid) and not options.linear and max(options.eyes, times) == 1
 
 
 class PanelStage:
@@ -53,16 +66,17 @@ class PanelStage:
         self._average: Average | None = None
         if max(options.eyes, times) > 1:
             self._average = Average(device, target, eyes=options.eyes, times=times)
-        exact = is_exact(options.rule, grid)
-        encoded_first = options.light == "encoded" or (exact and not options.linear)
+        encoded_first = codes_first(options, grid)
+        assert not target.encoded or codes_alone(options, grid, times=times)
         self._encode_views: EncodeViews | None = None
         self._codes: Weave | None = None
         self._weave: Weave | None = None
         self._encode: Encode | None = None
-        if encoded_first:
+        if encoded_first and not target.encoded:
             self._encode_views = EncodeViews(
                 device, (grid.columns, target.band_rows // times, views)
             )
+        if encoded_first:
             self._codes = Weave(device, display, grid, views, options.rule, encoded=True)
         if options.linear or not encoded_first:
             self._weave = Weave(device, display, grid, views, options.rule)
@@ -75,9 +89,11 @@ class PanelStage:
         if self._average:
             with clock.stage("average"):
                 images = self._average(band)
-        if self._encode_views and self._codes:
-            with clock.stage("encode_srgb"):
-                encoded = self._encode_views(images, exposure)
+        if self._codes:
+            encoded = images
+            if self._encode_views:
+                with clock.stage("encode_srgb"):
+                    encoded = self._encode_views(images, exposure)
             with clock.stage("weave"):
                 self._codes(encoded)
         if self._weave:

@@ -35,7 +35,8 @@ class Blocks:
         self._list = Kernel(device, "shade/blocks.comp", constants)
         self._row_blocks = -(-target.grid.columns // BLOCK)
         lines = target.band_rows * target.rig.views
-        self._blocks = Buffer(device, "shading blocks", 4 * self._row_blocks * lines)
+        block = dtype("Block").itemsize
+        self._blocks = Buffer(device, "shading blocks", block * self._row_blocks * lines)
         self.work = Buffer(device, "shading blocks", dtype("BlockWork").itemsize)
         self._no_work = np.zeros(1, dtype("BlockWork"))
         self._no_work["groups_z"] = 1
@@ -50,8 +51,8 @@ class Blocks:
         shown: Buffer | None = None,
     ) -> dict[str, Buffer]:
         """List the blocks; what shaders read of them and the pixels' words, by block name. rows: of
-        the band, [first, end), all by default. shown: uint32 [triangle] that becomes 1 where a
-        pixel shows it."""
+        the band, [first, end), all by default. shown: uint32 [triangle, 2] whose first becomes
+        1 where a pixel shows it."""
         first, end = rows or (0, band.rows)
         row_blocks = self._row_blocks * band.target.rig.views
         listed = {"Words": views.words, "Blocks": self._blocks, "BlockWorkBlock": self.work}
@@ -62,6 +63,8 @@ class Blocks:
             {
                 "FrameBlock": band.frame(batch),
                 **listed,
+                "Eyes": band.target.eyes,
+                "RowOffsets": band.target.row_offsets,
                 "TriangleTracks": shown or self._blocks,
             },
             {

@@ -12,7 +12,7 @@ from lfd_render.gpu.layout import CONSTANTS, dtype
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
-from lfd_render.passes.items import GROUPS_ACROSS, ROWS_DISPATCH, CountItems, Items
+from lfd_render.passes.items import GROUPS_ACROSS, ITEM_STEP, ROWS_DISPATCH, CountItems, Items
 from lfd_render.passes.owned import column_loops, iterations_left
 from lfd_render.passes.sample import HEADROOM
 from lfd_render.passes.sampling import Sampling
@@ -87,6 +87,7 @@ class CellSource(ABC):
             "WHOLE_ROWS": 0,
             "STRIP_ROWS": self._strip_rows,
             "GROUPS_ACROSS": GROUPS_ACROSS,
+            "ITEM_STEP": ITEM_STEP,
             **sampling.constants(),
             **scene.constants(),
         }
@@ -203,6 +204,7 @@ class SampleCells(CellSource):
                 "FrameBlock": band.frame(batch),
                 "Spans": points.items.spans,
                 "VisibleTriangles": points.items.visible,
+                "ItemStarts": points.items.starts,
                 "WorkBlock": points.items.work,
                 **points.splat_blocks(),
             },

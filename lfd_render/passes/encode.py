@@ -10,7 +10,6 @@ from lfd_render.gpu.device import Device
 from lfd_render.gpu.framebuffer import LayerTarget
 from lfd_render.gpu.memory import TextureArray
 from lfd_render.passes.screen import ScreenPass
-from lfd_render.passes.view_target import ViewImages
 
 
 class Encode:
@@ -49,31 +48,27 @@ class Encode:
         self._pass.release()
 
 
-class EncodeViews:
-    """View images in linear light → the same encoded, [view, row, column, RGBA] bytes."""
+class EncodeColor:
+    """One colour in linear light → the same encoded, as a device encodes pictures. RGB, 0 to 1."""
 
-    def __init__(self, device: Device, size: tuple[int, int, int]) -> None:
-        """size: columns, rows, views."""
-        self._pass = ScreenPass(device, "encode/encode.frag")
-        self.images = TextureArray(device, "encoded views", size, gl.RGBA8)
-        self.images.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
-        self._layer = LayerTarget(device, self.images)
+    def __init__(self, device: Device) -> None:
+        self._encode = Encode(device, 1, 1)
+        self._light = TextureArray(device, "picture", (1, 1, 1), gl.RGBA16F)
+        self._light.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
+        self._last: tuple[object, tuple[float, float, float]] = None, (0.0, 0.0, 0.0)
 
-    def __call__(self, linear: ViewImages, exposure: float) -> ViewImages:
-        """Encode the rows of all views."""
-        for view in range(self.images.layers):
-            self._layer.use(view)
-            self._pass(
-                {},
-                {"exposure": exposure, "layer": view},
-                {"linear_image": linear.images},
-                (0, self.images.height),
-                self.images.width,
-            )
-        return ViewImages(self.images, linear.first, linear.shown)
+    def __call__(
+        self, color: tuple[float, float, float], exposure: float
+    ) -> tuple[float, float, float]:
+        """Encode it. Waits for the device if it is another one than the last."""
+        if self._last[0] != (color, exposure):
+            self._light.clear((*color, 1.0))
+            self._encode(self._light, 0, exposure)
+            red, green, blue = (self._encode.read()[0, 0] / 255.0).tolist()
+            self._last = (color, exposure), (red, green, blue)
+        return self._last[1]
 
     def release(self) -> None:
         """Free everything."""
-        self._layer.release()
-        self.images.release()
-        self._pass.release()
+        self._encode.release()
+        self._light.release()

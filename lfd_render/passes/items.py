@@ -15,6 +15,7 @@ from lfd_render.gpu.scene_buffers import Batch
 from lfd_render.passes.view_target import Band
 
 SEGMENT = 64  # triangles a thread of the prefix sum takes
+ITEM_STEP = 64  # items whose triangles are found without a search
 GROUP_ROWS = 4  # rows of points a work group of the splatter takes
 GROUPS_ACROSS = 32768  # work groups along x before y grows
 ROWS_DISPATCH = 12  # byte offset of rows_x within Work
@@ -23,13 +24,15 @@ _SEGMENT_GROUP = 64  # local_size_x of sample/sum.comp and sample/compact.comp
 
 @dataclass
 class Items:
-    """spans: Span [triangle]; visible: Visible [≤ triangles]; work: Work [window]."""
+    """spans: Span [triangle]; visible: Visible [≤ triangles]; work: Work [window]; starts: index in
+    `visible` [each ITEM_STEPth item]."""
 
     spans: Buffer
     visible: Buffer
     segments: Buffer
     most_items: Buffer
     work: Buffer
+    starts: Buffer
     window_items: int
     windows: int
 
@@ -43,6 +46,7 @@ class Items:
             segments=Buffer(device, "points", 8 * segments),
             most_items=Buffer(device, "points", 4),
             work=Buffer(device, "points", dtype("Work").itemsize),
+            starts=Buffer(device, "points", 4),
             window_items=1,
             windows=1,
         )
@@ -53,7 +57,9 @@ class Items:
         """Choose how many windows there are and what each holds."""
         self.windows, self.window_items = windows, window_items
         self.work.release()
+        self.starts.release()
         self.work = Buffer(device, "points", dtype("Work").itemsize * windows)
+        self.starts = Buffer(device, "points", 4 * -(-windows * window_items // ITEM_STEP))
 
     def take_most(self) -> int:
         """The most items of any band since the last call. Waits for the device."""
@@ -63,7 +69,9 @@ class Items:
 
     def release(self) -> None:
         """Free the buffers."""
-        for buffer in (self.spans, self.visible, self.segments, self.most_items, self.work):
+        for buffer in (
+            self.spans, self.visible, self.segments, self.most_items, self.work, self.starts,
+        ):  # fmt: skip
             buffer.release()
 
 
@@ -73,6 +81,7 @@ class CountItems:
     def __init__(self, device: Device, view_lanes: int) -> None:
         constants: Mapping[str, int] = {
             "SEGMENT": SEGMENT,
+            "ITEM_STEP": ITEM_STEP,
             "GROUP_ROWS": GROUP_ROWS,
             "GROUPS_ACROSS": GROUPS_ACROSS,
         }
@@ -107,6 +116,7 @@ class CountItems:
                 "Spans": items.spans,
                 "Segments": items.segments,
                 "VisibleTriangles": items.visible,
+                "ItemStarts": items.starts,
             }
         )
         self._compact.run(groups)

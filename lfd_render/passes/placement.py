@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 @dataclass(frozen=True)
 class Placement:
     """Where the window stands in a frame. display_from_world: float64 [4, 4]; background: linear
-    RGB."""
+    RGB; exposure: of pictures that are encoded."""
 
     display_from_world: NDArray[np.float64]
     background: tuple[float, float, float]
+    exposure: float = 1.0
 
     @cached_property
     def turn_from_display(self) -> NDArray[np.float64]:

@@ -16,9 +16,10 @@ class PrefixSum:
     """Values → the sums of those before each, in place, and `total`: uint32 [2], the sum of all and
     the most that it was since `take_most`."""
 
-    def __init__(self, device: Device) -> None:
-        self._device = device
-        constants = {"SEGMENT": _SEGMENT}
+    def __init__(self, device: Device, *, stride: int = 1) -> None:
+        """stride: words from a value to the next, which is the last of so many."""
+        self._device, self._stride = device, stride
+        constants = {"SEGMENT": _SEGMENT, "STRIDE": stride}
         self._sum = Kernel(device, "prefix_sum/sum.comp", constants)
         self._scan = Kernel(device, "prefix_sum/scan.comp")
         self._add = Kernel(device, "prefix_sum/add.comp", constants)
@@ -27,8 +28,8 @@ class PrefixSum:
         self.total.fill(0)
 
     def __call__(self, values: Buffer, limit: Buffer) -> None:
-        """Sum the first `limit[0]` words of a buffer, if it holds so many, else all it holds."""
-        capacity = values.size // 4
+        """Sum the first `limit[0]` values of a buffer, if it holds so many, else all it holds."""
+        capacity = values.size // (4 * self._stride)
         segments = -(-capacity // _SEGMENT)
         if self._segments.size != 4 * segments:
             self._segments.release()

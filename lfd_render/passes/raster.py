@@ -168,11 +168,10 @@ class Raster:
             uniforms |= {"views": len(seen), "facing": 0}
         program.set(
             {
-                "DisplayPositions": batch.display_positions,
+                "DisplayVertices": batch.display_vertices,
                 "LocalPositions": batch.local_positions,
                 "Draws": self._scene.draws,
                 **batch.attributes(),
-                "WorldNormals": batch.world_normals,
                 "RasterViews": views,
                 **self._scene.materials_of(),
                 **lighting.buffers(),

@@ -14,6 +14,7 @@ from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.items import (
     GROUP_ROWS,
     GROUPS_ACROSS,
+    ITEM_STEP,
     ROWS_DISPATCH,
     CountItems,
     Items,
@@ -76,6 +77,7 @@ class Sample:
         constants = {
             "WHOLE_ROWS": int(whole_rows),
             "GROUPS_ACROSS": GROUPS_ACROSS,
+            "ITEM_STEP": ITEM_STEP,
             **sampling.constants(),
             **scene.constants(),
         }
@@ -136,6 +138,7 @@ class Sample:
                 "FrameBlock": band.frame(batch),
                 "Spans": points.spans,
                 "VisibleTriangles": points.visible,
+                "ItemStarts": points.starts,
                 "WorkBlock": points.work,
                 "RowOffsets": band.target.row_offsets,
                 "PointRows": points.rows,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.layout import lod_constants
 from lfd_render.gpu.memory import Buffer
-from lfd_render.gpu.programs import Kernel
+from lfd_render.gpu.programs import Kernel, Uniform
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.blocks import BLOCK, GROUP_BLOCKS, Blocks
 from lfd_render.passes.items import GROUPS_ACROSS
@@ -61,6 +61,7 @@ class Shade:
             "GROUP_BLOCKS": GROUP_BLOCKS,
             "WORD_STRIDE": word_stride,
             "GROUPS_ACROSS": GROUPS_ACROSS,
+            "ENCODED": int(target.encoded),
             **scene.constants(),
             **scene.lighting.constants(),
             **lod_constants(lod),
@@ -75,17 +76,16 @@ class Shade:
         self, batches: Sequence[Sampled], band: Band, views: Winners, placement: Placement
     ) -> None:
         """Shade a band over the background. batches: each with the points it was sampled by."""
-        images = band.target.images
-        images.clear((*placement.background, 0.0))
-        images.bind_image(0)
-        self._run(self._opaque, batches, band, views, placement)
+        known = band.target.shaded(placement)
+        self._run(self._opaque, batches, band, views, {**_turn(placement), **known})
 
     def blend(
         self, batches: Sequence[Sampled], band: Band, views: Winners, placement: Placement
     ) -> None:
         """Lay the blended surfaces that `views` now names over the band's images."""
+        assert not band.target.encoded
         band.target.images.bind_image(0, writeonly=False)
-        self._run(self._blend, batches, band, views, placement)
+        self._run(self._blend, batches, band, views, _turn(placement))
 
     def _run(
         self,
@@ -93,9 +93,8 @@ class Shade:
         batches: Sequence[Sampled],
         band: Band,
         views: Winners,
-        placement: Placement,
+        uniforms: Mapping[str, Uniform],
     ) -> None:
-        turn_from_display = gl_matrix(placement.turn_from_display)
         for batch, points in batches:
             shown = self._blocks(batch, band, views)
             kernel.set(
@@ -104,7 +103,6 @@ class Shade:
                     **shown,
                     **batch.geometry(),
                     **batch.attributes(),
-                    "WorldNormals": batch.world_normals,
                     **self._scene.materials_of(),
                     **self._scene.lighting.buffers(),
                     "Draws": self._scene.draws,
@@ -112,7 +110,7 @@ class Shade:
                     "RowOffsets": band.target.row_offsets,
                     "PointSizes": points.sizes,
                 },
-                {"turn_from_display": turn_from_display},
+                uniforms,
                 {**self._scene.samplers(), **self._scene.lighting.samplers()},
             )
             kernel.run_indirect(self._blocks.work)
@@ -121,3 +119,7 @@ class Shade:
         """Free kernels and the list."""
         for owner in (self._blocks, self._opaque, self._blend):
             owner.release()
+
+
+def _turn(placement: Placement) -> dict[str, Uniform]:
+    return {"turn_from_display": gl_matrix(placement.turn_from_display)}

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.layout import dtype, lod_constants
 from lfd_render.gpu.memory import Buffer
-from lfd_render.gpu.programs import Kernel
+from lfd_render.gpu.programs import Kernel, Uniform
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.blocks import BLOCK, GROUP_BLOCKS, Blocks
 from lfd_render.passes.items import GROUPS_ACROSS
@@ -59,6 +58,7 @@ class SharedShade:
             "GROUP_BLOCKS": GROUP_BLOCKS,
             "WORD_STRIDE": word_stride,
             "GROUPS_ACROSS": GROUPS_ACROSS,
+            "ENCODED": int(target.encoded),
             "MOST_GROUPS": MOST_GROUPS,
             **scene.constants(),
             **scene.lighting.constants(),
@@ -72,15 +72,14 @@ class SharedShade:
         self._places = Kernel(device, "share/places.comp", constants)
         self._matte = Kernel(device, "share/matte.comp", constants)
         self._light = Kernel(device, "share/light.comp", constants)
-        self._sum = PrefixSum(device)
+        self._sum = PrefixSum(device, stride=2)
         triangles = max((batch.triangles for batch in scene.batches), default=0)
-        self._words = Buffer(device, "slice tracks", 4 * triangles)
-        self._starts = Buffer(device, "slice tracks", 4 * triangles)
+        # Two words a triangle; those of two triangles are fetched at once.
+        self._of_triangles = Buffer(device, "slice tracks", 8 * (triangles + triangles % 2))
         self._triangles = {
             count: Buffer.of(device, "slice tracks", np.array([count], np.uint32))
             for count in {batch.triangles for batch in scene.batches}
         }
-        self._view_groups = Buffer.of(device, "slice tracks", view_groups(target.rig.views))
         self._work = Buffer(device, "shared cells", dtype("SharedWork").itemsize)
         self._work.fill(0)
         self._parts = 1  # of a band, so that each fits
@@ -91,7 +90,7 @@ class SharedShade:
         device = self._device
         self._room = (min(max(tracks, 1), MOST_TRACKS), min(max(cells, 1), MOST_CELLS))
         tracks, cells = self._room
-        self._shown = Buffer(device, "slice tracks", 8 * tracks)
+        self._shown = Buffer(device, "slice tracks", 4 * tracks)
         self._track_records = Buffer(device, "slice tracks", dtype("Track").itemsize * tracks)
         self._cells = Buffer(device, "shared cells", 16 * cells)
 
@@ -102,15 +101,15 @@ class SharedShade:
         views: ViewBuffers,
         placement: Placement,
     ) -> None:
-        """Shade a band over the background, as `Shade.opaque` does; its words name nothing then.
+        """Shade a band over the background, as `Shade.opaque` does.
         batches: each with the points, on rows, that it was sampled by."""
-        band.target.images.clear((*placement.background, 0.0))
-        band.target.images.bind_image(0)
+        turn: dict[str, Uniform] = {"turn_from_display": gl_matrix(placement.turn_from_display)}
+        uniforms = turn | band.target.shaded(placement)
         parts = min(self._parts, band.rows)
         for part in range(parts):
             rows = (part * band.rows // parts, (part + 1) * band.rows // parts)
             for batch, points in batches:
-                self._shade(batch, points, band, views, placement, rows=rows)
+                self._shade(batch, points, band, views, uniforms, rows=rows)
 
     def _shade(
         self,
@@ -118,32 +117,28 @@ class SharedShade:
         points: Points,
         band: Band,
         views: ViewBuffers,
-        placement: Placement,
+        uniforms: Mapping[str, Uniform],
         *,
         rows: tuple[int, int],
     ) -> None:
-        """Shade what some rows of a band, [first, end), show of a batch."""
+        """Shade what some rows of a band, [first, end), show of a batch. uniforms: the turn and
+        what storing needs to know."""
         frame = {"FrameBlock": band.frame(batch)}
         eyes = {"Eyes": band.target.eyes, "RowOffsets": band.target.row_offsets}
         geometry = {**frame, **batch.geometry(), "Draws": self._scene.draws}
-        of_triangles = {
-            "TriangleTracks": self._words,
-            "TrackStarts": self._starts,
-            "ViewGroups": self._view_groups,
-        }
+        of_triangles = {"TriangleTracks": self._of_triangles}
         cells = {"Tracks": self._track_records, "Cells": self._cells}
         work = {"SharedWorkBlock": self._work}
         lighting = self._scene.lighting
-        turn = {"turn_from_display": gl_matrix(placement.turn_from_display)}
 
-        self._words.fill(0)
-        listed = self._blocks(batch, band, views, rows=rows, shown=self._words)
+        self._of_triangles.fill(0)
+        listed = self._blocks(batch, band, views, rows=rows, shown=self._of_triangles)
         self._tracks.set(
             {**geometry, **of_triangles, "Spans": points.sizes, "Eyes": eyes["Eyes"]},
             {"first_row": band.first + rows[0], "end_row": band.first + rows[1]},
         )
         self._tracks.run((-(-batch.triangles // _GROUP), 1, 1))
-        self._sum(self._starts, self._triangles[batch.triangles])
+        self._sum(self._of_triangles, self._triangles[batch.triangles])
 
         self._shown.fill(0)
         self._mark.set({**frame, **listed, **of_triangles, "Shown": self._shown})
@@ -153,7 +148,8 @@ class SharedShade:
         shown = {"Shown": self._shown, "TrackTotal": self._sum.total}
         groups = _groups(self._room[0])
         self._places.set(
-            {**geometry, **shown, **eyes, **cells, **work}, {"groups_across": groups[0]}
+            {**geometry, **of_triangles, **shown, **eyes, **cells, **work},
+            {"groups_across": groups[0]},
         )
         self._places.run(groups)
 
@@ -162,7 +158,6 @@ class SharedShade:
             {
                 **geometry,
                 **batch.attributes(),
-                "WorldNormals": batch.world_normals,
                 **self._scene.materials_of(),
                 **lighting.buffers(),
                 **eyes,
@@ -170,14 +165,22 @@ class SharedShade:
                 **work,
                 "Cells": self._cells,
             },
-            {**turn, "groups_across": groups[0]},
+            {"turn_from_display": uniforms["turn_from_display"], "groups_across": groups[0]},
             {**self._scene.samplers(), **lighting.samplers()},
         )
         self._matte.run(groups)
         self._light.set(
-            {**frame, **listed, **eyes, **lighting.buffers(), "Depths": views.depths},
-            turn,
-            {**lighting.samplers(), "tracks": self._track_records, "cells": self._cells},
+            {
+                **frame,
+                **listed,
+                **of_triangles,
+                **cells,
+                **lighting.buffers(),
+                "Eyes": band.target.eyes,
+                "Depths": views.depths,
+            },
+            uniforms,
+            lighting.samplers(),
         )
         self._light.run_indirect(self._blocks.work)
 
@@ -201,7 +204,7 @@ class SharedShade:
         owners: tuple[_Owner, ...] = (
             self._blocks, self._sum,
             self._tracks, self._mark, self._places, self._matte, self._light,
-            self._words, self._starts, *self._triangles.values(), self._view_groups, self._work,
+            self._of_triangles, *self._triangles.values(), self._work,
             self._shown, self._track_records, self._cells,
         )  # fmt: skip
         for owner in owners:
@@ -213,15 +216,3 @@ def _groups(count: int) -> tuple[int, int, int]:
     groups = -(-count // _GROUP)
     across = min(groups, GROUPS_ACROSS)
     return across, -(-groups // across), 1
-
-
-def view_groups(views: int) -> NDArray[np.uint32]:
-    """The group of each view, where views are divided into 1 to MOST_GROUPS: its number and its
-    middle view << 5, uint32 [groups - 1, view]."""
-    view = np.arange(views, dtype=np.uint32)
-    words = np.zeros((MOST_GROUPS, views), np.uint32)
-    for groups in range(1, MOST_GROUPS + 1):
-        group = view * groups // views
-        first, last = np.searchsorted(group, group), np.searchsorted(group, group, "right") - 1
-        words[groups - 1] = group | ((first + last) // 2).astype(np.uint32) << 5
-    return words

@@ -9,8 +9,8 @@ _GROUP = 128  # local_size_x of transform/*.comp
 
 
 class Transform:
-    """SceneBuffers, Batch → Batch.display_positions and world_normals: rigid vertices by their
-    draws' matrices, deformed ones by morph targets and joints, in a dispatch of their own."""
+    """SceneBuffers, Batch → Batch.display_vertices: rigid vertices by their draws' matrices,
+    deformed ones by morph targets and joints, in a dispatch of their own."""
 
     def __init__(self, device: Device) -> None:
         self._rigid = Kernel(device, "transform/vertices.comp")
@@ -22,8 +22,7 @@ class Transform:
         buffers = {
             "LocalPositions": batch.local_positions,
             "Draws": scene.draws,
-            "DisplayPositions": batch.display_positions,
-            "WorldNormals": batch.world_normals,
+            "DisplayVertices": batch.display_vertices,
         }
         if batch.rigid_vertices:
             self._rigid.set(

@@ -107,7 +107,11 @@ class PackedViewBuffers:
 
     def __init__(self, device: Device, target: ViewTarget) -> None:
         self._pixels = target.band_pixels
-        self.words = self.depths = Buffer(device, "view buffers", 8 * target.band_pixels)
+        self.words = self.depths = Buffer(
+            device,
+            "view buffers",
+            8 * (self._pixels + self._pixels % 2),  # two are fetched at once
+        )
         self._forget = Kernel(device, "splat/forget.comp")
 
     def blocks(self) -> dict[str, Buffer]:

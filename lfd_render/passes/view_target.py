@@ -16,7 +16,10 @@ from lfd_render.gpu import raw as gl
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.layout import dtype
 from lfd_render.gpu.memory import Buffer, TextureArray
+from lfd_render.gpu.programs import Uniform
 from lfd_render.gpu.scene_buffers import Batch
+from lfd_render.passes.encode import EncodeColor
+from lfd_render.passes.placement import Placement
 
 BAND_BYTES = 64 << 20  # of one 32-bit word a view pixel; two fit a buffer of llvmpipe, 128 MiB
 MOST_BAND_ROWS = 1000  # with at most 4 Mi triangles a batch, items stay below 2³²
@@ -24,8 +27,9 @@ MOST_BAND_ROWS = 1000  # with at most 4 Mi triangles a batch, items stay below 2
 
 @dataclass(frozen=True, eq=False)
 class ViewImages:
-    """Images of all views, [view, row, column], whose row 0 is view row `first`; the panel rows
-    that show the view rows `shown`, [first, end), can be woven from them."""
+    """Images of all views, [view, row, column], in linear light or encoded, whose row 0 is view row
+    `first`; the panel rows that show the view rows `shown`, [first, end), can be woven from
+    them."""
 
     images: TextureArray
     first: int
@@ -52,7 +56,8 @@ class Band:
 
 
 class ViewTarget:
-    """Rig, grid and bands, with the view images [view, row of the band, column] in linear light."""
+    """Rig, grid and bands, with the view images [view, row of the band, column], in linear light,
+    or encoded if nothing is asked of them but codes."""
 
     def __init__(
         self,
@@ -64,11 +69,13 @@ class ViewTarget:
         *,
         row_step: int = 1,
         halo: int = 0,
+        encoded: bool = False,
     ) -> None:
         """row_step: bands hold a multiple of so many rows. halo: rows around those shown, a
         multiple of it too."""
         assert grid.rows % row_step == halo % row_step == 0
         self.rig = rig
+        self.encoded = encoded
         self.grid = grid
         row_bytes = 4 * rig.views * grid.columns
         most = min(MOST_BAND_ROWS, BAND_BYTES // row_bytes)
@@ -89,9 +96,13 @@ class ViewTarget:
         self.eyes = Buffer.of(device, "rig", (rig.eye_x_mm / grid.column_mm).astype(np.float32))
         self.row_offsets = Buffer.of(device, "rig", grid.row_offset.astype(np.float32))
         self.images = TextureArray(
-            device, "view images", (grid.columns, self.band_rows, rig.views), gl.RGBA16F
+            device,
+            "view images",
+            (grid.columns, self.band_rows, rig.views),
+            gl.RGBA8 if encoded else gl.RGBA16F,
         )
         self.images.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
+        self._background = EncodeColor(device) if encoded else None
         self.frame_blocks = {
             (band, batch.triangle_base): Buffer.of(
                 device, "frame", _frame_record(band, batch, seed)
@@ -104,6 +115,17 @@ class ViewTarget:
         start, stop = max(first - halo, 0), min(end + halo, self.grid.rows)
         return Band(self, start, stop - start, (first, end))
 
+    def shaded(self, placement: Placement) -> dict[str, Uniform]:
+        """Clear the images to a frame's background and make them what shaders store to; what those
+        shaders need to know (shade/images.glsl, where ENCODED is `encoded`)."""
+        color, exposure = placement.background, placement.exposure
+        known: dict[str, Uniform] = {}
+        if self._background:
+            color, known = self._background(color, exposure), {"exposure": exposure}
+        self.images.clear((*color, 0.0))
+        self.images.bind_image(0)
+        return known
+
     @property
     def band_pixels(self) -> int:
         """View pixels of the largest band."""
@@ -114,6 +136,8 @@ class ViewTarget:
         for buffer in (self.eyes, self.row_offsets, *self.frame_blocks.values()):
             buffer.release()
         self.images.release()
+        if self._background:
+            self._background.release()
 
 
 def _frame_record(band: Band, batch: Batch, seed: int) -> np.ndarray[tuple[int], np.dtype[np.void]]:

@@ -22,7 +22,7 @@ BOX_DIRECTIONS = np.array([[-0.5063697, 0.5625, 0.6534], [0.8320503, 0.3328, -0.
 BOX_RADIANCES = np.array([[5.0, 4.7, 4.3], [2.2, 2.6, 3.4]])
 BOX_SHARPNESSES = np.array([40.0, 60.0])
 
-KEY_DIRECTION = np.array([-0.4423259, 0.6634888, 0.6031718])
+KEY_DIRECTION = np.array([-0.4423954, 0.6635931, 0.6032666])
 KEY_IRRADIANCE = np.array([2.1, 2.0, 1.85])  # on a surface that faces it
 
 

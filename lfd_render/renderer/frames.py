@@ -68,12 +68,10 @@ class PanelFrames:
         clock = StageClock(self._device)
         self.technique.begin(placement, clock)
         self.technique.warm_up(clock)
-        self._panel.band(self.technique.target.warm_up_band, clock, 1.0)
-        self._panel.finish(clock, 1.0)
+        self._panel.band(self.technique.target.warm_up_band, clock, placement.exposure)
+        self._panel.finish(clock, placement.exposure)
 
-    def run(
-        self, placement: Placement, exposure: float, progress: Progress
-    ) -> tuple[float, dict[str, float]]:
+    def run(self, placement: Placement, progress: Progress) -> tuple[float, dict[str, float]]:
         """One frame: its milliseconds, whole and by stage. progress: told the part that is done."""
         complete = False
         while not complete:
@@ -84,9 +82,9 @@ class PanelFrames:
             bands = self.technique.target.bands
             for index, band in enumerate(bands):
                 self.technique.render(band, clock)
-                self._panel.band(band, clock, exposure)
+                self._panel.band(band, clock, placement.exposure)
                 progress((index + 1) / len(bands))
-            self._panel.finish(clock, exposure)
+            self._panel.finish(clock, placement.exposure)
             self._device.finish()
             elapsed_ms = 1000.0 * (time.perf_counter() - start)
             complete = self.technique.complete()

@@ -19,7 +19,7 @@ from lfd_render.gpu.lighting import EnvironmentMap
 from lfd_render.gpu.scene_buffers import SceneBuffers
 from lfd_render.panel.eia import Eia, eia_metadata
 from lfd_render.panel.quilt import Quilt
-from lfd_render.panel.stage import LIGHTS, PanelOptions
+from lfd_render.panel.stage import LIGHTS, PanelOptions, codes_alone
 from lfd_render.panel.unweave import Unwoven
 from lfd_render.panel.weaving import check_views, weave_pictures
 from lfd_render.passes.average import Average
@@ -33,6 +33,7 @@ from lfd_render.renderer.plan import ViewPlan, plan_panel, plan_views, upright_s
 from lfd_render.renderer.stage import REPEAT_TURN_RAD, Stage, check_frame, check_in_front
 from lfd_render.scene import Environment, Pose, Scene
 from lfd_render.techniques import Lfdpr, Technique, make_mvr
+from lfd_render.techniques.mvr import is_deferred
 
 MOST_EYES = 2048
 MOST_VIEW_PIXELS = 1 << 32  # of all views together: hours on a processor, and far above any panel
@@ -154,11 +155,12 @@ class Renderer:
         buffers.pose(pose)
 
         def compile_all() -> PanelFrames:
-            technique = self._technique(buffers, plan, choice)
             panel = PanelOptions(plan.rule, plan.eyes, choice.aa_light, choice.linear)
+            codes = codes_alone(panel, plan.grid, times=plan.times)
+            technique = self._technique(buffers, plan, choice, codes=codes)
             frames = PanelFrames(self.device, technique, display, plan.grid, panel)
             matrix = camera.display_from_world(plan.rig.panel_mm)
-            frames.warm_up(Placement(matrix, choice.background))
+            frames.warm_up(Placement(matrix, choice.background, choice.exposure))
             return frames
 
         frames = timings.measure("compile", self.device, compile_all)
@@ -388,7 +390,13 @@ class Renderer:
             self._environment_map.release()
             self._environment_map = self._environment = None
 
-    def _technique(self, buffers: SceneBuffers, plan: ViewPlan, choice: RenderOptions) -> Technique:
+    def _technique(
+        self, buffers: SceneBuffers, plan: ViewPlan, choice: RenderOptions, *, codes: bool = False
+    ) -> Technique:
+        """codes: whether nothing is asked of views but codes, which what shades them may store
+        where it neither rasterises nor blends."""
+        shades = choice.technique != "mvr" or is_deferred(choice.mvr)
+        blends = any(batch.alpha_mode == "blend" for batch in buffers.batches)
         target = ViewTarget(
             self.device,
             plan.rig,
@@ -397,6 +405,7 @@ class Renderer:
             choice.seed,
             row_step=plan.times,
             halo=plan.halo,
+            encoded=codes and shades and not blends,
         )
         if choice.technique == "mvr":
             return make_mvr(self.device, buffers, target, variant=choice.mvr, lod=choice.lod_rule)

@@ -120,8 +120,9 @@ class Stage:
         if pose is None:
             check_in_front(self.scene, camera, rig)
         self._buffers.pose(pose)
-        placement = Placement(camera.display_from_world(rig.panel_mm), choice.background)
-        frame = self._frames.run(placement, choice.exposure, progress)
+        matrix = camera.display_from_world(rig.panel_mm)
+        placement = Placement(matrix, choice.background, choice.exposure)
+        frame = self._frames.run(placement, progress)
         self._timings.frames.append(frame)
         self._last_camera = camera
         return frame[0]

@@ -26,12 +26,12 @@ void emit(vec2 cell) {
 
 void main() {
     uint index = first_triangle + uint(gl_PrimitiveIDIn);
-    uvec4 triangle = triangles[index];
-    vec3 a = display_positions[triangle.x].xyz;
-    vec3 b = display_positions[triangle.y].xyz;
-    vec3 c = display_positions[triangle.z].xyz;
+    uvec4 triangle = corners_of(index);
+    vec3 a = position_of(triangle.x);
+    vec3 b = position_of(triangle.y);
+    vec3 c = position_of(triangle.z);
     Plane plane = triangle_plane(a, b, c);
-    if (rows_seen(a, b, c, plane, draws[triangle.w].facing).y == 0) return;
+    if (rows_seen(a, b, c, plane, draw_facing(triangle.w)).y == 0) return;
     if (VERTEX_CULLING != 0 && (vertex_seen_[0] | vertex_seen_[1] | vertex_seen_[2]) == 0u) return;
     if (STOCHASTIC_CULLING != 0 && !stochastically_kept(frame.triangle_base + index, plane)) return;
     Aligned t = align(a, b, c, plane);

@@ -8,10 +8,10 @@ flat in uint of_triangle;
 flat in vec2 of_step_mm;
 
 void main() {
-    uvec4 corners = triangles[of_triangle];
-    vec3 a = display_positions[corners.x].xyz;
-    vec3 b = display_positions[corners.y].xyz;
-    vec3 c = display_positions[corners.z].xyz;
+    uvec4 corners = corners_of(of_triangle);
+    vec3 a = position_of(corners.x);
+    vec3 b = position_of(corners.y);
+    vec3 c = position_of(corners.z);
     Aligned t = align(a, b, c, triangle_plane(a, b, c));
     ivec2 cell = ivec2(gl_FragCoord.xy);
     ivec2 touched = cells_touched(t, of_step_mm, cell.y);

@@ -15,10 +15,10 @@ void main() {
     if (place >= work[window].items) return;
     uint item = work[window].first_item + place;
     Visible seen = visible[visible_at(item)];
-    uvec4 corners = triangles[seen.triangle];
-    vec3 a = display_positions[corners.x].xyz;
-    vec3 b = display_positions[corners.y].xyz;
-    vec3 c = display_positions[corners.z].xyz;
+    uvec4 corners = corners_of(seen.triangle);
+    vec3 a = position_of(corners.x);
+    vec3 b = position_of(corners.y);
+    vec3 c = position_of(corners.z);
     Aligned t = align(a, b, c, triangle_plane(a, b, c));
     vec2 step_mm = lattice_steps_mm[seen.triangle];
     uint j = item - seen.first_item;

@@ -39,7 +39,7 @@ const SoftBox SOFT_BOX[SOFT_BOXES] = SoftBox[](
     SoftBox(vec3(-0.5063697, 0.5625, 0.6534), vec3(5.0, 4.7, 4.3), 40.0),
     SoftBox(vec3(0.8320503, 0.3328, -0.4438), vec3(2.2, 2.6, 3.4), 60.0));
 
-const vec3 KEY_DIRECTION = vec3(-0.4423259, 0.6634888, 0.6031718);  // towards the light
+const vec3 KEY_DIRECTION = vec3(-0.4423954, 0.6635931, 0.6032666);  // towards the light
 const vec3 KEY_IRRADIANCE = vec3(2.1, 2.0, 1.85);
 
 vec3 studio_gradient(float up, float width) {
@@ -47,14 +47,14 @@ vec3 studio_gradient(float up, float width) {
     return mix(FLOOR, mix(HORIZON, CEILING, smoothstep(0.0, 1.0 + width, up)), above);
 }
 
-// A spherical Gaussian of sharpness λ blurred by one of sharpness μ has about λμ/(λ + μ), its integral kept.
+// A spherical Gaussian of sharpness λ blurred by one of sharpness μ = 2/α² has about λμ/(λ + μ), its integral kept.
 vec3 studio_radiance(vec3 direction, float roughness) {
-    float lobe = 2.0 / max(1e-3, roughness * roughness * roughness * roughness);
+    float half_width = 0.5 * max(1e-3, roughness * roughness * roughness * roughness);  // 1/μ
     vec3 radiance = studio_gradient(direction.y, 0.15 + roughness);
     for (int i = 0; i < SOFT_BOXES; i++) {
-        float sharpness = SOFT_BOX[i].sharpness * lobe / (SOFT_BOX[i].sharpness + lobe);
+        float part = 1.0 / (1.0 + SOFT_BOX[i].sharpness * half_width), sharpness = part * SOFT_BOX[i].sharpness;
         float cosine = dot(direction, SOFT_BOX[i].direction);
-        radiance += SOFT_BOX[i].radiance * (sharpness / SOFT_BOX[i].sharpness) * exp(sharpness * (cosine - 1.0));
+        radiance += SOFT_BOX[i].radiance * part * exp(sharpness * (cosine - 1.0));
     }
     return radiance;
 }

@@ -37,7 +37,7 @@ vec3 mapped_normal(vec3 normal, Surface surface, uint slot) {
     float side = -sign(dot(bitangent, along_v)), length_2 = dot(tangent, tangent);
     if (length_2 == 0.0 || side == 0.0) return normal;
     vec3 m = sample_linear(slot, f).xyz * 2.0 - 1.0;
-    m.xy *= unpackHalf2x16(materials[surface.material].normal_occlusion).x;
+    m.xy *= normal_scale(surface.material);
     return normalize((m.x * tangent + m.y * side * bitangent) * inversesqrt(length_2) + m.z * normal);
 }
 
@@ -60,7 +60,7 @@ vec4 base_color_of(Surface surface, int rule) {
 
 // Occlusion, roughness, metallic, as the maps' channels lie (r, g, b).
 vec3 occlusion_roughness_metallic(Surface surface) {
-    vec2 factors = unpackUnorm2x16(materials[surface.material].metallic_roughness);
+    vec2 factors = metallic_roughness(surface.material);
     uint slot = slot_of(surface.material, METALLIC_ROUGHNESS), occlusion_slot = slot_of(surface.material, OCCLUSION);
     vec4 maps = vec4(1.0);
     if (slot != NO_TEXTURE)
@@ -69,14 +69,13 @@ vec3 occlusion_roughness_metallic(Surface surface) {
     // Files nearly always pack both in one texture, which SHARED_OCCLUSION says of the whole scene.
     if (SHARED_OCCLUSION == 0 && occlusion_slot != NO_TEXTURE)
         occlusion = sample_linear(occlusion_slot, slot_footprint(surface.material, OCCLUSION, surface.uv0, surface.uv1)).r;
-    float strength = unpackHalf2x16(materials[surface.material].normal_occlusion).y;
+    float strength = occlusion_strength(surface.material);
     occlusion = occlusion_slot == NO_TEXTURE ? 1.0 : 1.0 + strength * (occlusion - 1.0);
     return vec3(occlusion, maps.g * factors.y, maps.b * factors.x);
 }
 
 vec3 emitted(Surface surface) {
-    Material material = materials[surface.material];
-    vec3 radiance = vec3(unpackHalf2x16(material.emissive_rg), unpackHalf2x16(material.emissive_b_cutoff).x);
+    vec3 radiance = emissive_factor(surface.material);
     uint slot = slot_of(surface.material, EMISSIVE);
     if (slot != NO_TEXTURE)
         radiance *= sample_srgb(slot, slot_footprint(surface.material, EMISSIVE, surface.uv0, surface.uv1), LOD_RULE).rgb;
@@ -85,7 +84,7 @@ vec3 emitted(Surface surface) {
 
 Matte matte_of(Surface surface) {
     vec4 base_color = base_color_of(surface, LOD_RULE);
-    if ((materials[surface.material].flags & UNLIT) != 0u)
+    if (is_unlit(surface.material))
         return Matte(base_color.rgb, vec3(0.0, 0.0, 1.0), vec3(0.0), 1.0, 0.0, false, base_color.a);
     vec3 orm = occlusion_roughness_metallic(surface), normal = shading_normal(surface);
     vec3 albedo = base_color.rgb * (1.0 - orm.b);

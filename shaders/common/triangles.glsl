@@ -1,8 +1,12 @@
 // The batch's triangles in display space.
 
+#include "common/display.glsl"
+#include "common/draws.glsl"
 #include "common/facing.glsl"
-#include "layout/Draw"
 
-layout(std430) readonly restrict buffer Triangles { uvec4 triangles[]; };  // vertices, draw
-layout(std430) readonly restrict buffer DisplayPositions { vec4 display_positions[]; };
-layout(std430) readonly restrict buffer Draws { Draw draws[]; };
+uniform usamplerBuffer Triangles;
+
+// Vertices, and the draw.
+uvec4 corners_of(uint triangle) {
+    return texelFetch(Triangles, int(triangle));
+}

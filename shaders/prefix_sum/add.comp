@@ -11,8 +11,8 @@ void main() {
     if (first >= end) return;
     uint running = segments[segment];
     for (uint i = first; i < end; i++) {
-        uint here = values[i];
-        values[i] = running;
+        uint here = values[word_of(i)];
+        values[word_of(i)] = running;
         running += here;
     }
 }

@@ -10,6 +10,6 @@ void main() {
     uint end = min(first + SEGMENT, value_count());
     if (segment >= segments.length()) return;
     uint sum = 0u;
-    for (uint i = first; i < end; i++) sum += values[i];
+    for (uint i = first; i < end; i++) sum += values[word_of(i)];
     segments[segment] = sum;
 }

@@ -1,21 +1,18 @@
 // A vertex of the batch as a corner.
-// In: DisplayPositions, vertex attributes, LocalPositions (draw index).
+// In: DisplayVertices, vertex attributes, LocalPositions, Draws.
 
 #include "common/vertices.glsl"
-#include "common/normals.glsl"
+#include "common/display.glsl"
+#include "common/draws.glsl"
+#include "common/local.glsl"
 #include "raster/corner.glsl"
-#include "layout/Draw"
-
-layout(std430) readonly restrict buffer DisplayPositions { vec4 display_positions[]; };
-layout(std430) readonly restrict buffer LocalPositions { vec4 local_positions[]; };
-layout(std430) readonly restrict buffer Draws { Draw draws[]; };
 
 out Corner CORNER corner;
 
 void load_corner() {
-    corner.p_display = display_positions[gl_VertexID].xyz;
+    corner.p_display = position_of(uint(gl_VertexID));
     corner.normal_world = vertex_normal(uint(gl_VertexID));
-    corner.uv01 = vec4(tex_coords[gl_VertexID], vertex_uv1(uint(gl_VertexID)));
+    corner.uv01 = vec4(vertex_uv0(uint(gl_VertexID)), vertex_uv1(uint(gl_VertexID)));
     corner.color = vertex_color(uint(gl_VertexID));
-    corner.material = draws[floatBitsToUint(local_positions[gl_VertexID].w)].material;
+    corner.material = draw_material(draw_of_vertex(uint(gl_VertexID)));
 }

@@ -1,5 +1,6 @@
 // The list of visible triangles with the number of items (rows) before each, in their order.
-// In: Spans, Segments (exclusive sums). Out: VisibleTriangles.
+// In: Spans, Segments (exclusive sums). Out: VisibleTriangles, ItemStarts (the visible triangle that holds each
+// ITEM_STEPth item, from which a search for an item goes on).
 
 layout(local_size_x = 64) in;
 
@@ -10,6 +11,7 @@ layout(local_size_x = 64) in;
 layout(std430) readonly restrict buffer Spans { Span spans[]; };
 layout(std430) readonly restrict buffer Segments { uvec2 segments[]; };
 layout(std430) writeonly restrict buffer VisibleTriangles { Visible visible[]; };
+layout(std430) writeonly restrict buffer ItemStarts { uint item_starts[]; };
 
 void main() {
     uint segment = gl_GlobalInvocationID.x;
@@ -20,6 +22,8 @@ void main() {
         uint rows = spans[t].rows >> 16;
         if (rows == 0u) continue;
         visible[running.x] = Visible(t, running.y);
+        uint steps = min((running.y + rows + ITEM_STEP - 1u) / ITEM_STEP, item_starts.length());
+        for (uint s = (running.y + ITEM_STEP - 1u) / ITEM_STEP; s < steps; s++) item_starts[s] = running.x;
         running += uvec2(1u, rows);
     }
 }

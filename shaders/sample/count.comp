@@ -17,9 +17,9 @@ void main() {
     PointRow points = point_rows[place];
     Slice slice = slice_of(points);
     if (slice.a == slice.b) return;
-    uvec4 corners = triangles[points.triangle];
-    Plane plane = triangle_plane(display_positions[corners.x].xyz, display_positions[corners.y].xyz,
-                                 display_positions[corners.z].xyz);
+    uvec4 corners = corners_of(points.triangle);
+    Plane plane = triangle_plane(position_of(corners.x), position_of(corners.y),
+                                 position_of(corners.z));
     float eye = densest_eye_columns(plane), cell = spans[points.triangle].point_columns;
     float p = column_from(slice.a, eye), q = column_from(slice.b, eye);
     int first = int(floor(min(p, q) / cell)), end = int(ceil(max(p, q) / cell));

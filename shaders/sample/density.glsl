@@ -45,12 +45,11 @@ bool stochastically_kept(uint triangle_id, Plane plane) {
 
 // Equation 1: n_tex, the most texels that any texture lays on the triangle.
 float most_texels(uvec4 triangle) {
-    uint material = draws[triangle.w].material;
-    float texels = materials[material].texels_uv0
-        * area(tex_coords[triangle.x], tex_coords[triangle.y], tex_coords[triangle.z]);
+    uint material = draw_material(triangle.w);
+    vec2 texels_of = material_texels(material);
+    float texels = texels_of.x * area(vertex_uv0(triangle.x), vertex_uv0(triangle.y), vertex_uv0(triangle.z));
     if (VERTEX_EXTRAS != 0)
-        texels = max(texels, materials[material].texels_uv1
-            * area(vertex_uv1(triangle.x), vertex_uv1(triangle.y), vertex_uv1(triangle.z)));
+        texels = max(texels, texels_of.y * area(vertex_uv1(triangle.x), vertex_uv1(triangle.y), vertex_uv1(triangle.z)));
     return texels;
 }
 

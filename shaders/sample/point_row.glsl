@@ -7,13 +7,13 @@
 #include "layout/PointRow"
 
 PointRow point_row(uint triangle, int row) {
-    uvec4 corners = triangles[triangle];
-    vec3 a = display_positions[corners.x].xyz;
-    vec3 b = display_positions[corners.y].xyz;
-    vec3 c = display_positions[corners.z].xyz;
+    uvec4 corners = corners_of(triangle);
+    vec3 a = position_of(corners.x);
+    vec3 b = position_of(corners.y);
+    vec3 c = position_of(corners.z);
     Slice slice = slice_triangle(a, b, c, row, row_offsets[row]);
     if (!slice.exists) slice.a = slice.b = SliceEnd(0.0, 1.0);  // covers nothing
-    uint facing = draws[corners.w].facing;
+    uint facing = draw_facing(corners.w);
     bool both = (facing & FACING_BOTH) != 0u;
     // The eye that sees the triangle densest tells best which end is left where it is faced.
     Plane plane = triangle_plane(a, b, c);

@@ -1,17 +1,19 @@
 // The blocks of BLOCK columns that show triangles of a batch: a software device runs all that a branch
 // skips, and backgrounds are large. The order of the list varies; what it leads to does not.
-// In: Words. Out: Blocks (row of the band << 22 | view << 12 | block of the row), BlockWork, and which triangles are
-// shown.
+// In: Words, Eyes, RowOffsets. Out: Blocks, BlockWork, and which triangles are shown.
 
 layout(local_size_x = 64) in;
 
 #include "common/frame.glsl"
+#include "layout/Block"
 #include "layout/BlockWork"
 
 layout(std430) readonly restrict buffer Words { uint words[]; };
-layout(std430) writeonly restrict buffer Blocks { uint blocks[]; };
+layout(std430) readonly restrict buffer Eyes { float eyes[]; };
+layout(std430) readonly restrict buffer RowOffsets { float row_offsets[]; };
+layout(std430) writeonly restrict buffer Blocks { Block blocks[]; };
 layout(std430) restrict buffer BlockWorkBlock { BlockWork block_work; };
-layout(std430) writeonly restrict buffer TriangleTracks { uint triangle_tracks[]; };  // where MARK_TRIANGLES is 1
+layout(std430) writeonly restrict buffer TriangleTracks { uvec2 triangle_tracks[]; };  // where MARK_TRIANGLES is 1
 
 uniform uint first_block;   // of all of the band, and how many
 uniform uint block_count;
@@ -30,11 +32,12 @@ void main() {
         uint triangle = words[WORD_STRIDE * (line * uint(frame.columns) + column)] - frame.triangle_base;
         if (triangle >= frame.triangles) continue;
         any_here = true;
-        if (MARK_TRIANGLES != 0) triangle_tracks[triangle] = 1u;
+        if (MARK_TRIANGLES != 0) triangle_tracks[triangle].x = 1u;
     }
     if (!any_here) return;
     uint place = atomicAdd(block_work.blocks, 1u), group = place / GROUP_BLOCKS;
-    blocks[place] = (line / uint(frame.views)) << 22 | (line % uint(frame.views)) << 12 | block % row_blocks;
+    uint row = line / uint(frame.views), view = line % uint(frame.views);
+    blocks[place] = Block(row << 22 | view << 12 | block % row_blocks, eyes[view], row_offsets[frame.band_first + int(row)], 0u);
     atomicMax(block_work.groups_x, min(group + 1u, GROUPS_ACROSS));
     atomicMax(block_work.groups_y, group / GROUPS_ACROSS + 1u);
 }

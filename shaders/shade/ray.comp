@@ -5,14 +5,13 @@
 
 layout(local_size_x = BLOCK, local_size_y = GROUP_BLOCKS) in;
 
+#include "shade/images.glsl"
 #include "shade/surface.glsl"
 #include "shade/visible.glsl"
-
-layout(rgba16f, binding = 0) writeonly restrict uniform image2DArray view_images;
 
 void main() {
     Visible seen = visible_pixel();
     if (seen.nothing) return;
     Surface surface = surface_at(seen.triangle, seen.pixel.z, frame.band_first + seen.pixel.y, seen.pixel.x);
-    imageStore(view_images, seen.pixel, vec4(shade(surface).rgb, 1.0));
+    store(seen.pixel, shade(surface).rgb);
 }

@@ -3,7 +3,6 @@
 #include "common/triangles.glsl"
 #include "common/surface.glsl"
 #include "common/vertices.glsl"
-#include "common/normals.glsl"
 #include "common/shading.glsl"
 
 layout(std430) readonly restrict buffer Eyes { float eyes[]; };
@@ -24,10 +23,10 @@ bool on_a_line(mat3x2 uv, mat2 sides) {
 }
 
 Surface surface_of(uint triangle, float eye_mm, Plane plane, Hit hit) {
-    uvec4 corners = triangles[triangle];
-    mat3x2 uv0 = mat3x2(tex_coords[corners.x], tex_coords[corners.y], tex_coords[corners.z]);
+    uvec4 corners = corners_of(triangle);
+    mat3x2 uv0 = mat3x2(vertex_uv0(corners.x), vertex_uv0(corners.y), vertex_uv0(corners.z));
     mat3x2 uv1 = mat3x2(vertex_uv1(corners.x), vertex_uv1(corners.y), vertex_uv1(corners.z));
-    uint facing = draws[corners.w].facing;
+    uint facing = draw_facing(corners.w);
     vec3 views = LOD_RULE == LOD_MULTIVIEW ? footprint_views(triangle, plane, eye_mm, facing, depth_of(hit.p_display)) : ONE_VIEW;
 
     Surface surface;
@@ -42,16 +41,16 @@ Surface surface_of(uint triangle, float eye_mm, Plane plane, Hit hit) {
     surface.line0 = on_a_line(uv0, sides0);
     surface.line1 = on_a_line(uv1, sides1);
     surface.color = mat3x4(vertex_color(corners.x), vertex_color(corners.y), vertex_color(corners.z)) * hit.weights;
-    surface.material = draws[corners.w].material;
+    surface.material = draw_material(corners.w);
     surface.back = (eye_side(plane, eye_mm) < 0.0) != ((facing & FACING_MIRRORED) != 0u);
     return surface;
 }
 
 Surface surface_at(uint triangle, int view, int row, int column) {
-    uvec4 corners = triangles[triangle];
-    vec3 a = display_positions[corners.x].xyz;
-    vec3 b = display_positions[corners.y].xyz;
-    vec3 c = display_positions[corners.z].xyz;
+    uvec4 corners = corners_of(triangle);
+    vec3 a = position_of(corners.x);
+    vec3 b = position_of(corners.y);
+    vec3 c = position_of(corners.z);
     float eye_mm = eyes[view] * frame.column_mm;
     Plane plane = triangle_plane(a, b, c);
     return surface_of(triangle, eye_mm, plane, shaded_hit(triangle, a, b, c, plane, eye_mm, row, column));

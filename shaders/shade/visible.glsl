@@ -4,17 +4,20 @@
 #include "layout/BlockWork"
 
 // Winners, each WORD_STRIDE words from the one before.
-#ifdef WORDS_WRITTEN
-layout(std430) restrict buffer Words { uint words[]; };
-#else
 layout(std430) readonly restrict buffer Words { uint words[]; };
-#endif
-layout(std430) readonly restrict buffer Blocks { uint blocks[]; };  // see shade/blocks.comp
+uniform usamplerBuffer Blocks;  // a texel a Block
 layout(std430) readonly restrict buffer BlockWorkBlock { BlockWork block_work; };
 
-// A pixel of the views and what it shows. Nothing: background, or a triangle of another batch.
-struct Visible {
+// A pixel of the views, or of column −1 beyond the list; its eye and how far its row is moved, in columns.
+struct Listed {
     ivec3 pixel;  // column, row of the band, view
+    float eye;
+    float row_offset;
+};
+
+// What a pixel shows. Nothing: background, or a triangle of another batch.
+struct Visible {
+    ivec3 pixel;
     bool nothing;
     uint triangle;
 };
@@ -24,18 +27,19 @@ uint band_pixel(ivec3 pixel) {
     return uint((pixel.y * frame.views + pixel.z) * frame.columns + pixel.x);
 }
 
-// This invocation's pixel, or -1 beyond the list.
-ivec3 listed_pixel() {
+// This invocation's pixel.
+Listed listed_pixel() {
     uint place = (gl_WorkGroupID.y * GROUPS_ACROSS + gl_WorkGroupID.x) * GROUP_BLOCKS + gl_LocalInvocationID.y;
-    uint block = place < block_work.blocks ? blocks[place] : 0u;
-    int column = int((block & 0xFFFu) * BLOCK + gl_LocalInvocationID.x);
-    if (place >= block_work.blocks || column >= frame.columns) return ivec3(-1);
-    return ivec3(column, int(block >> 22), int(block >> 12 & 0x3FFu));
+    bool beyond = place >= block_work.blocks;
+    uvec4 block = texelFetch(Blocks, beyond ? 0 : int(place));
+    int column = int((block.x & 0xFFFu) * BLOCK + gl_LocalInvocationID.x);
+    if (beyond || column >= frame.columns) column = -1;
+    return Listed(ivec3(column, int(block.x >> 22), int(block.x >> 12 & 0x3FFu)), uintBitsToFloat(block.y), uintBitsToFloat(block.z));
 }
 
 Visible visible_pixel() {
     Visible seen;
-    seen.pixel = listed_pixel();
+    seen.pixel = listed_pixel().pixel;
     seen.nothing = seen.pixel.x < 0;
     if (seen.nothing) return seen;
     seen.triangle = words[WORD_STRIDE * band_pixel(seen.pixel)] - frame.triangle_base;

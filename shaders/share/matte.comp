@@ -18,10 +18,10 @@ void main() {
     uvec4 cell = cells[place];
     int row = int(cell.y & 0xFFFFu);
     float eye_mm = eyes[cell.y >> 16] * frame.column_mm;
-    uvec4 corners = triangles[cell.x];
-    vec3 a = display_positions[corners.x].xyz;
-    vec3 b = display_positions[corners.y].xyz;
-    vec3 c = display_positions[corners.z].xyz;
+    uvec4 corners = corners_of(cell.x);
+    vec3 a = position_of(corners.x);
+    vec3 b = position_of(corners.y);
+    vec3 c = position_of(corners.z);
     Plane plane = triangle_plane(a, b, c);
     float x_mm = (uintBitsToFloat(cell.z) - row_offsets[row]) * frame.column_mm;
     Hit hit = hit_triangle(a, b, c, plane, eye_mm, x_mm, row_centre_mm(row));

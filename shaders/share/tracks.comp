@@ -1,14 +1,14 @@
 // How many tracks the triangles have that some pixel shows: for every row a group of views, so many groups that a pixel's
 // footprint is about that of the group's middle view, in width and in how far it leans over a row.
-// In: the batch, Spans. In, out: TriangleTracks (whether shown; then see tracks.glsl). Out: TrackStarts (counts).
+// In: the batch, Spans. In, out: TriangleTracks (whether shown; then see tracks.glsl, but numbers of tracks for first tracks).
 
 layout(local_size_x = 64) in;
 
 #include "common/triangles.glsl"
 #include "common/plane.glsl"
 #include "layout/Span"
-#include "share/tracks.glsl"
 
+layout(std430) restrict buffer TriangleTracks { uvec2 triangle_tracks[]; };
 layout(std430) readonly restrict buffer Spans { Span spans[]; };
 layout(std430) readonly restrict buffer Eyes { float eyes[]; };
 
@@ -16,6 +16,7 @@ uniform int first_row;  // of the part of the band, and where it ends
 uniform int end_row;
 
 const float LEAST_DENSITY = 0.5;  // of a group's sparsest view over its densest
+const uint BOTH_SIDES = 1u << 21;  // as in tracks.glsl
 const float MOST_LEAN = 0.5;      // of a view's footprint over the middle view's, columns a row
 
 // The first view that sees the other side than the first view does.
@@ -33,16 +34,14 @@ uint crossing_view(Plane plane) {
 void main() {
     uint index = gl_GlobalInvocationID.x;
     if (index >= frame.triangles) return;
-    bool shown = triangle_tracks[index] != 0u;
-    track_starts[index] = 0u;
-    if (!shown) return;
+    if (triangle_tracks[index].x == 0u) return;
 
-    uvec4 triangle = triangles[index];
-    Plane plane = triangle_plane(display_positions[triangle.x].xyz, display_positions[triangle.y].xyz,
-                                 display_positions[triangle.z].xyz);
+    uvec4 triangle = corners_of(index);
+    Plane plane = triangle_plane(position_of(triangle.x), position_of(triangle.y),
+                                 position_of(triangle.z));
     float first = eye_side(plane, frame.eye_first * frame.column_mm);
     float last = eye_side(plane, frame.eye_last * frame.column_mm);
-    bool turns = (first < 0.0) != (last < 0.0), both = (draws[triangle.w].facing & FACING_BOTH) != 0u;
+    bool turns = (first < 0.0) != (last < 0.0), both = (draw_facing(triangle.w) & FACING_BOTH) != 0u;
     uint rows = spans[index].rows, groups = 2u;
     int from = max(int(rows & 0xFFFFu), first_row), to = min(int((rows & 0xFFFFu) + (rows >> 16)), end_row);
     uint word = uint(from);
@@ -55,6 +54,5 @@ void main() {
         float lean = (frame.eye_last - frame.eye_first) * abs(plane.normal.y) * frame.row_mm / max(most + least, 1e-30);
         groups = uint(clamp(ceil(max(by_density, lean / MOST_LEAN)), 1.0, min(float(MOST_GROUPS), float(frame.views))));
     }
-    triangle_tracks[index] = word | groups << 16;
-    track_starts[index] = uint(max(to - from, 0)) * groups;
+    triangle_tracks[index] = uvec2(word | groups << 16, uint(max(to - from, 0)) * groups);
 }

@@ -20,10 +20,10 @@ uniform int first_row;  // the strip of the window to splat into, which bounds w
 uniform int end_row;
 
 void splat_cell(Cell point, int view, float eye) {
-    uvec4 corners = triangles[point.triangle];
-    vec3 a = display_positions[corners.x].xyz;
-    vec3 b = display_positions[corners.y].xyz;
-    vec3 c = display_positions[corners.z].xyz;
+    uvec4 corners = corners_of(point.triangle);
+    vec3 a = position_of(corners.x);
+    vec3 b = position_of(corners.y);
+    vec3 c = position_of(corners.z);
     Plane plane = triangle_plane(a, b, c);
     Aligned t = align(a, b, c, plane);
     Box box = cell_box(t, lattice_steps_mm[point.triangle], uvec2(point.cell & 0xFFFFu, point.cell >> 16), eye);
@@ -39,6 +39,6 @@ void splat_cell(Cell point, int view, float eye) {
         seen.end = min(seen.end, right);
         splat_interval(points, seen, view, eye);
     }
-    if (faces(draws[corners.w].facing, eye_side(plane, eye * frame.column_mm)))
+    if (faces(draw_facing(corners.w), eye_side(plane, eye * frame.column_mm)))
         tried(uint(boxed_rows.x >= first_row && boxed_rows.x < end_row ? max(boxed, 1) : boxed));
 }

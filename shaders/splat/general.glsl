@@ -72,15 +72,15 @@ bool owns(float value, vec3 p, vec3 q, float orientation) {
 }
 
 void splat_row(PointRow points, int view) {
-    uvec4 corners = triangles[points.triangle];
-    mat3 corners_display = mat3(display_positions[corners.x].xyz, display_positions[corners.y].xyz, display_positions[corners.z].xyz);
+    uvec4 corners = corners_of(points.triangle);
+    mat3 corners_display = mat3(position_of(corners.x), position_of(corners.y), position_of(corners.z));
     mat4 pixel_from_display = pixel_matrices[view];
     vec3 a = (pixel_from_display * vec4(corners_display[0], 1.0)).xyw;
     vec3 b = (pixel_from_display * vec4(corners_display[1], 1.0)).xyw;
     vec3 c = (pixel_from_display * vec4(corners_display[2], 1.0)).xyw;
     ivec4 box = footprint_box(corners_display, row_of(points), pixel_from_display);
 
-    uint facing = draws[corners.w].facing;
+    uint facing = draw_facing(corners.w);
     uint id = frame.triangle_base + points.triangle;
     int boxed = 0;
     for (int row = max(frame.band_first, box.y); row < min(frame.band_first + frame.band_rows, box.w); row++) {

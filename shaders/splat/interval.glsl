@@ -22,8 +22,8 @@ Interval interval_of(PointRow points, float eye) {
     // Rounding may turn a slice of no length round; its neighbours rely on what it covers.
     bool faced = a < b + ROUNDING_COLUMNS || (points.row_sides & DOUBLE_SIDED) != 0u, seen = faced;
     if (VERTEX_CULLING != 0) {
-        uvec4 corners = triangles[points.triangle];
-        seen = seen && vertices_seen(display_positions[corners.x].xyz, display_positions[corners.y].xyz, display_positions[corners.z].xyz, eye);
+        uvec4 corners = corners_of(points.triangle);
+        seen = seen && vertices_seen(position_of(corners.x), position_of(corners.y), position_of(corners.z), eye);
     }
     int column = max(column_cut(min(a, b)), 0), end = min(column_cut(max(a, b)), frame.columns);
     return Interval(column, seen ? end : column, a, b, faced);

@@ -1,30 +1,28 @@
 // Vertices of deformed meshes, local or bind space → display space, and their normals → world: morph
 // targets first, then the blend of their joints' matrices (glTF 2.0, sections 3.7.2.2 and 3.7.3.3).
 // A draw that no skin moves has one joint, its placement.
-// In: LocalPositions (xyz, draw index as bits), LocalNormals, Draws, and for each deformed vertex a
+// In: LocalPositions, LocalNormals, Draws, and for each deformed vertex a
 // DeformSpan of MorphDeltas and of sets of four InfluenceJoints (2 × 16 bits each) and InfluenceWeights.
 // The spans bound the loops: Mesa makes uniforms that do constants, and zink's does not see them change.
-// Out: DisplayPositions (xyz, w = 1), WorldNormals; those of flat meshes are transform/flat.comp's.
+// Out: DisplayVertices; normals of flat meshes are transform/flat.comp's.
 
 layout(local_size_x = 128) in;
 
 #include "layout/DeformSpan"
-#include "layout/Draw"
 #include "layout/JointMatrix"
 #include "layout/MorphDelta"
+#include "common/draws.glsl"
+#include "common/local.glsl"
 #include "common/octahedral.glsl"
 
-layout(std430) readonly restrict buffer LocalPositions { vec4 local_positions[]; };
 layout(std430) readonly restrict buffer LocalNormals { uint local_normals[]; };
-layout(std430) readonly restrict buffer Draws { Draw draws[]; };
 layout(std430) readonly restrict buffer DeformSpans { DeformSpan deform_spans[]; };
 layout(std430) readonly restrict buffer MorphDeltas { MorphDelta morph_deltas[]; };
 layout(std430) readonly restrict buffer MorphWeights { float morph_weights[]; };
 layout(std430) readonly restrict buffer InfluenceJoints { uvec2 influence_joints[]; };
 layout(std430) readonly restrict buffer InfluenceWeights { vec4 influence_weights[]; };
 layout(std430) readonly restrict buffer JointMatrices { JointMatrix joint_matrices[]; };
-layout(std430) writeonly restrict buffer DisplayPositions { vec4 display_positions[]; };
-layout(std430) writeonly restrict buffer WorldNormals { uint world_normals[]; };
+layout(std430) writeonly restrict buffer DisplayVertices { uvec4 display_vertices[]; };
 
 uniform uint first;     // vertex of the batch that deforms
 uniform uint vertices;  // that deform
@@ -37,16 +35,16 @@ JointMatrix plus(JointMatrix sum, uint joint, float weight) {
 }
 
 // What takes a vertex to display space.
-JointMatrix blended(uint influence, uint end, uint first_joint) {
-    if (influence == end) return joint_matrices[first_joint];
+JointMatrix blended(uint influence, uint end, uint first) {
+    if (influence == end) return joint_matrices[first];
     JointMatrix sum = JointMatrix(vec4(0.0), vec4(0.0), vec4(0.0));
     for (uint i = influence; i < end; i++) {
         uvec2 joints = influence_joints[i];
         vec4 weights = influence_weights[i];
-        sum = plus(sum, first_joint + (joints.x & 0xFFFFu), weights.x);
-        sum = plus(sum, first_joint + (joints.x >> 16), weights.y);
-        sum = plus(sum, first_joint + (joints.y & 0xFFFFu), weights.z);
-        sum = plus(sum, first_joint + (joints.y >> 16), weights.w);
+        sum = plus(sum, first + (joints.x & 0xFFFFu), weights.x);
+        sum = plus(sum, first + (joints.x >> 16), weights.y);
+        sum = plus(sum, first + (joints.y & 0xFFFFu), weights.z);
+        sum = plus(sum, first + (joints.y >> 16), weights.w);
     }
     return sum;
 }
@@ -64,20 +62,20 @@ void main() {
     uint deformed = gl_GlobalInvocationID.x;
     if (deformed >= vertices) return;
     uint vertex = first + deformed;
-    vec4 local = local_positions[vertex];
-    uint draw = floatBitsToUint(local.w);
-    vec3 position = local.xyz;
+    uint draw = draw_of_vertex(vertex);
+    vec3 position = local_position(vertex);
     vec3 normal = direction_from(local_normals[vertex]);
-    uint first_weight = draws[draw].first_weight;
+    uint weights = first_weight(draw);
     DeformSpan span = deform_spans[deformed];
     for (uint i = span.first_delta; i < span.end_delta; i++) {
         MorphDelta delta = morph_deltas[i];
-        float weight = morph_weights[first_weight + delta.target];
+        float weight = morph_weights[weights + delta.target];
         position += weight * vec3(delta.position_x, delta.position_y, delta.position_z);
         normal += weight * vec3(delta.normal_x, delta.normal_y, delta.normal_z);
     }
-    JointMatrix matrix = blended(span.first_influence, span.end_influence, draws[draw].first_joint);
+    JointMatrix matrix = blended(span.first_influence, span.end_influence, first_joint(draw));
     vec4 p = vec4(position, 1.0);
-    display_positions[vertex] = vec4(dot(matrix.row_x, p), dot(matrix.row_y, p), dot(matrix.row_z, p), 1.0);
-    world_normals[vertex] = word_from((world_from_display_plane * vec4(turned(matrix, normal), 0.0)).xyz);
+    vec3 p_display = vec3(dot(matrix.row_x, p), dot(matrix.row_y, p), dot(matrix.row_z, p));
+    vec3 n_world = (world_from_display_plane * vec4(turned(matrix, normal), 0.0)).xyz;
+    display_vertices[vertex] = uvec4(floatBitsToUint(p_display), word_from(n_world));
 }

@@ -331,7 +331,7 @@ class Passes:
     def triangles(self) -> Triangles:
         """The reference's triangles, at the positions that the device computed."""
         p_display = [
-            batch.display_positions.read(np.float32)
+            batch.display_vertices.read(np.float32)
             .reshape(-1, 4)[batch.corners.read(np.uint32).reshape(-1, 4)[:, :3], :3]
             .astype(np.float64)
             for batch in self.buffers.batches

@@ -1,15 +1,21 @@
 """Shading that views share: the picture of rays but for what lies between two places of a slice."""
 
 import dataclasses
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from lfd_render import DisplayProfile, Renderer, Scene
+from lfd_render.gpu import shaders
 from lfd_render.gpu.device import Device
+from lfd_render.gpu.layout import dtype
+from lfd_render.gpu.memory import Buffer
+from lfd_render.gpu.programs import Kernel
 from lfd_render.passes import share
-from lfd_render.passes.share import MOST_GROUPS, view_groups
+from lfd_render.passes.share import MOST_GROUPS
 from lfd_render.scene import Light, Material
 
 from .helpers import PAPER, few_lenses, mesh_of, millimetre_camera, scene_of, soup
@@ -21,20 +27,53 @@ VIEWS = 24
 SIZE = (160, 120)
 
 
-@pytest.mark.parametrize("views", [2, 7, 48, 1024])
-def test_groups_divide_views_in_order_about_their_middle(views: int) -> None:
-    for groups, words in enumerate(view_groups(views), start=1):
-        number, middle = words & 0x1F, words >> 5
-        used = np.unique(number)
-        assert (np.diff(number.astype(int)) >= 0).all()
-        if groups <= views:
-            assert len(used) == groups
-            sizes = np.bincount(number)
-            assert sizes.max() - sizes.min() <= 1
-        for group in used:
-            members = np.flatnonzero(number == group)
-            assert set(middle[members]) == {(members[0] + members[-1]) // 2}
-    assert len(view_groups(views)) == MOST_GROUPS
+GROUPS = """layout(local_size_x = 1) in;
+#include "common/frame.glsl"
+#include "share/tracks.glsl"
+layout(std430) writeonly restrict buffer Found { uvec2 found[]; };
+void main() {
+    uvec2 tracks = tracks_of(gl_WorkGroupID.y);
+    uint view = gl_WorkGroupID.x, group = group_of(tracks, view);
+    found[gl_WorkGroupID.y * uint(frame.views) + view] = uvec2(group, middle_of(tracks, group));
+}
+"""
+
+
+@pytest.mark.parametrize("views", [2, 7, 48, 1000])
+def test_groups_divide_views_in_order_about_their_middle(
+    device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, views: int
+) -> None:
+    """As many groups as are asked for, and those before and from a view that sees another side."""
+    folder = tmp_path / "shaders"
+    shutil.copytree(shaders.data_folder("shaders"), folder)
+    (folder / "groups.comp").write_text(GROUPS)
+    monkeypatch.setattr(shaders, "data_folder", lambda _: folder)
+    view = np.arange(views)
+    counts, crossings = range(1, min(MOST_GROUPS, views) + 1), (1, views // 2, views - 1)
+    words = [count << 16 for count in counts]
+    words += [2 << 16 | 1 << 21 | crossing << 22 for crossing in crossings]
+    expected = [view * count // views for count in counts]
+    expected += [(view >= crossing).astype(int) for crossing in crossings]
+
+    frame = np.zeros(1, dtype("Frame"))
+    frame["views"] = views
+    pairs = np.zeros((len(words) + len(words) % 2, 2), np.uint32)
+    pairs[: len(words), 0] = words
+    kernel, found = Kernel(device, "groups.comp"), Buffer(device, "test", 8 * views * len(words))
+    block, tracks = Buffer.of(device, "test", frame), Buffer.of(device, "test", pairs)
+    kernel.set({"FrameBlock": block, "TriangleTracks": tracks, "Found": found})
+    kernel.run((views, len(words), 1))
+    groups, middles = np.moveaxis(found.read(np.uint32).reshape(len(words), views, 2), 2, 0)
+    np.testing.assert_array_equal(groups, expected)
+    for of, middle in zip(groups, middles, strict=True):
+        for group in np.unique(of):
+            members = np.flatnonzero(of == group)
+            # Of both sides' groups the second's middle is half a view on where that is none.
+            assert set(middle[members]) <= {
+                (members[0] + members[-1]) // 2, (members[0] + members[-1] + 1) // 2
+            }  # fmt: skip
+    for owner in (kernel, found, block, tracks):
+        owner.release()
 
 
 @pytest.fixture(scope="module")

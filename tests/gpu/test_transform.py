@@ -50,7 +50,7 @@ def directions(words: NDArray[np.uint32]) -> NDArray[np.float64]:
 def placed_by_device(opened: Passes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Positions and unit normals of the corners of all triangles, [triangle, corner, xyz]."""
     normals = [
-        directions(batch.world_normals.read(np.uint32))[
+        directions(batch.display_vertices.read(np.uint32)[3::4])[
             batch.corners.read(np.uint32).reshape(-1, 4)[:, :3]
         ]
         for batch in opened.buffers.batches
