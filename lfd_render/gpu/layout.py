@@ -207,8 +207,12 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("float", "steps_per_column"),
         ("uint", "view_steps"),
     ),
-    # Cells of all tracks, and the most since the host last looked.
+    # Cells of all tracks: what dispatches a thread for each, how many there are, and the most since
+    # the host last looked.
     "SharedWork": (
+        ("uint", "groups_x"),
+        ("uint", "groups_y"),
+        ("uint", "groups_z"),
         ("uint", "cells"),
         ("uint", "most_cells"),
     ),
@@ -246,7 +250,7 @@ CONSTANTS: dict[str, int] = {
     "SLOT_LAYER_BITS": 16,
     "NO_TEXTURE": 0xFFFFFFFF,
     **{f"LOD_{rule.upper().replace('-', '_')}": n for n, rule in enumerate(LOD_RULES)},
-    "MOST_TAPS": 16,  # of an anisotropic fetch
+    "MOST_ASPECT": 16,  # of a footprint whose short axis sets the level of an anisotropic fetch
 }
 
 

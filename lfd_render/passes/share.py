@@ -82,6 +82,7 @@ class SharedShade:
         }
         self._work = Buffer(device, "shared cells", dtype("SharedWork").itemsize)
         self._work.fill(0)
+        self._no_work = np.array([0, 0, 1, 0], np.uint32)  # without the most
         self._parts = 1  # of a band, so that each fits
         pixels = target.band_pixels
         self._make_room(pixels // PIXELS_A_TRACK, pixels // PIXELS_A_CELL)
@@ -138,22 +139,17 @@ class SharedShade:
             {"first_row": band.first + rows[0], "end_row": band.first + rows[1]},
         )
         self._tracks.run((-(-batch.triangles // _GROUP), 1, 1))
-        self._sum(self._of_triangles, self._triangles[batch.triangles])
+        self._sum(self._of_triangles, self._triangles[batch.triangles], self._room[0])
 
         self._shown.fill(0)
         self._mark.set({**frame, **listed, **of_triangles, "Shown": self._shown})
         self._mark.run_indirect(self._blocks.work)
 
-        self._work.write(np.zeros(1, np.uint32))
+        self._work.write(self._no_work)
         shown = {"Shown": self._shown, "TrackTotal": self._sum.total}
-        groups = _groups(self._room[0])
-        self._places.set(
-            {**geometry, **of_triangles, **shown, **eyes, **cells, **work},
-            {"groups_across": groups[0]},
-        )
-        self._places.run(groups)
+        self._places.set({**geometry, **of_triangles, **shown, **eyes, **cells, **work})
+        self._places.run_indirect(self._sum.dispatch)
 
-        groups = _groups(self._room[1])
         self._matte.set(
             {
                 **geometry,
@@ -165,10 +161,10 @@ class SharedShade:
                 **work,
                 "Cells": self._cells,
             },
-            {"turn_from_display": uniforms["turn_from_display"], "groups_across": groups[0]},
+            {"turn_from_display": uniforms["turn_from_display"]},
             {**self._scene.samplers(), **lighting.samplers()},
         )
-        self._matte.run(groups)
+        self._matte.run_indirect(self._work)
         self._light.set(
             {
                 **frame,
@@ -187,7 +183,10 @@ class SharedShade:
     def fit(self) -> bool:
         """Make room for the tracks and cells of frames since the last call; whether there was too
         little. Waits for the device."""
-        tracks, cells = self._sum.take_most(), int(self._work.read(np.uint32)[1])
+        tracks, cells = (
+            self._sum.take_most(),
+            int(self._work.read(dtype("SharedWork"))["most_cells"][0]),
+        )
         self._work.fill(0)
         if tracks <= self._room[0] and cells <= self._room[1]:
             return False
@@ -209,10 +208,3 @@ class SharedShade:
         )  # fmt: skip
         for owner in owners:
             owner.release()
-
-
-def _groups(count: int) -> tuple[int, int, int]:
-    """Work groups for so many threads."""
-    groups = -(-count // _GROUP)
-    across = min(groups, GROUPS_ACROSS)
-    return across, -(-groups // across), 1

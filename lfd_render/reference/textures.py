@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Float64 = NDArray[np.float64]
 Int = NDArray[np.int64]
 
-MOST_TAPS = 16  # of an anisotropic fetch
+MOST_ASPECT = 16  # of an ellipse that taps are as wide as
 
 
 def linear_from_srgb(encoded: Float64) -> Float64:
@@ -154,15 +154,15 @@ def ellipses(dx: Float64, dy: Float64) -> tuple[Float64, Float64, Float64]:
 def _anisotropic(
     levels: Sequence[Float64], uv: Float64, dx: Float64, dy: Float64, wrap: tuple[str, str]
 ) -> Float64:
-    """The mean of taps as wide as the ellipse is short, or a texel, evenly along it; at most
-    MOST_TAPS, which are then wider."""
+    """The mean of taps as wide as the ellipse is short, or a texel, evenly along it, 0.7 for each
+    such width; they are wider where MOST_ASPECT widths do not reach."""
     long, short, direction = ellipses(dx, dy)
-    ratio = np.clip(long / np.maximum(short, 1.0), 1.0, MOST_TAPS)
-    count = np.ceil(ratio)
+    ratio = np.clip(long / np.maximum(short, 1.0), 1.0, MOST_ASPECT)
+    count = np.ceil(0.7 * ratio)
     lod = np.log2(np.maximum(long, 1e-6) / ratio)
     height, width = levels[0].shape[:2]
     total = np.zeros((len(uv), 4))
-    for tap in range(MOST_TAPS):
+    for tap in range(MOST_ASPECT):
         used = tap < count
         along = ((tap + 0.5) / count - 0.5) * long
         at = uv + along[:, None] * direction / (width, height)

@@ -58,6 +58,10 @@ Taps multiview_taps(Footprint f, float texels) {
     return Taps(f.views.z > 0.0 ? 2 : 1, f.uv, vec2(0.0), lods, vec2(1.0 - f.views.z, f.views.z));
 }
 
+// Taps along the long axis of an ellipse a width of its short one: they are further apart than they are wide, since what
+// interpolation between texels takes in is wider still (docs/performance.md).
+const float TAPS_PER_WIDTH = 0.7;
+
 // The footprint as an ellipse: the circle about a pixel, of a pixel's diameter, by the Jacobian. Taps
 // stand along its long axis, each as wide as the short one (Heckbert 1989; McCormack et al. 1999).
 Taps anisotropic_taps(Footprint f, vec2 x, vec2 y, float texels, vec2 size) {
@@ -65,10 +69,10 @@ Taps anisotropic_taps(Footprint f, vec2 x, vec2 y, float texels, vec2 size) {
     float half_gap = length(vec2(0.5 * (xx - yy), xy));
     float major = sqrt(0.5 * (xx + yy) + half_gap);
     float minor = texels / max(major, 1e-12);
-    float ratio = clamp(major / max(minor, 1.0), 1.0, float(MOST_TAPS));
+    float ratio = clamp(major / max(minor, 1.0), 1.0, float(MOST_ASPECT));
     // Of two forms of the long axis the one whose terms do not cancel.
     vec2 axis = xx > yy ? vec2(0.5 * (xx - yy) + half_gap, xy) : vec2(xy, 0.5 * (yy - xx) + half_gap);
-    float count = ceil(ratio);
+    float count = ceil(TAPS_PER_WIDTH * ratio);
     vec2 step = axis * (major / (count * max(length(axis), 1e-30))) / size;
     return Taps(int(count), f.uv - 0.5 * (count - 1.0) * step, step, vec2(log2(max(major, 1e-6) / ratio)), vec2(1.0 / count));
 }

@@ -1,11 +1,15 @@
-// Exclusive prefix sum over the segments, in place, by one work group, and the total of all.
-// In, out: Segments. Out: Total (the total, and the most that it was since the host last looked).
+// Exclusive prefix sum over the segments, in place, by one work group, the total of all, and what dispatches a thread for
+// each unit of it.
+// In, out: Segments. Out: Total (the total, and the most that it was since the host last looked), Dispatch.
 
 #define THREADS 256u
 layout(local_size_x = 256) in;
 
 layout(std430) restrict buffer Segments { uint segments[]; };
 layout(std430) restrict buffer Total { uint total[]; };
+layout(std430) writeonly restrict buffer Dispatch { uint dispatch[]; };
+
+uniform uint most_units;
 
 shared uint sums[THREADS];
 
@@ -35,5 +39,9 @@ void main() {
     if (thread == THREADS - 1u) {
         total[0] = running;
         total[1] = max(total[1], running);
+        uint groups = (min(running, most_units) + 63u) / 64u;
+        dispatch[0] = min(groups, GROUPS_ACROSS);
+        dispatch[1] = (groups + GROUPS_ACROSS - 1u) / GROUPS_ACROSS;
+        dispatch[2] = 1u;
     }
 }

@@ -10,10 +10,8 @@ layout(local_size_x = 64) in;
 layout(std430) readonly restrict buffer SharedWorkBlock { SharedWork shared_work; };
 layout(std430) restrict buffer Cells { uvec4 cells[]; };
 
-uniform uint groups_across;
-
 void main() {
-    uint place = (gl_WorkGroupID.y * groups_across + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
+    uint place = (gl_WorkGroupID.y * GROUPS_ACROSS + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
     if (place >= min(shared_work.cells, cells.length())) return;
     uvec4 cell = cells[place];
     int row = int(cell.y & 0xFFFFu);

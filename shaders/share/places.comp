@@ -19,15 +19,13 @@ layout(std430) writeonly restrict buffer Tracks { Track tracks[]; };
 layout(std430) writeonly restrict buffer Cells { uvec4 cells[]; };
 layout(std430) restrict buffer SharedWorkBlock { SharedWork shared_work; };
 
-uniform uint groups_across;
-
-const float SHORT = 0.3;  // columns
+const float SHORT = 0.4;  // columns
 const float STEPS_PER_COLUMN = 2.0;
 
 shared uint group_cells, group_first;
 
 void main() {
-    uint track = (gl_WorkGroupID.y * groups_across + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
+    uint track = (gl_WorkGroupID.y * GROUPS_ACROSS + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
     uint mark = track < min(track_total[0], shown.length()) ? shown[track] : 0u, triangle = mark - 1u;
     uint steps = 0u, count = 0u, row = 0u, view = 0u;
     float from = 0.0, to = 0.0;
@@ -54,6 +52,9 @@ void main() {
     if (gl_LocalInvocationID.x == 0u) {
         group_first = atomicAdd(shared_work.cells, group_cells);
         atomicMax(shared_work.most_cells, group_first + group_cells);
+        uint groups = (min(group_first + group_cells, cells.length()) + 63u) / 64u;
+        atomicMax(shared_work.groups_x, min(groups, GROUPS_ACROSS));
+        atomicMax(shared_work.groups_y, (groups + GROUPS_ACROSS - 1u) / GROUPS_ACROSS);
     }
     barrier();
     if (mark == 0u) return;

@@ -215,7 +215,7 @@ def test_wrong_rules_are_named() -> None:
 
 
 def test_the_reference_takes_as_many_taps() -> None:
-    assert CONSTANTS["MOST_TAPS"] == textures.MOST_TAPS
+    assert CONSTANTS["MOST_ASPECT"] == textures.MOST_ASPECT
 
 
 # ---- planted faults ---------------------------------------------------------------------------
