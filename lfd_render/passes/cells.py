@@ -208,7 +208,7 @@ class SampleCells(CellSource):
                 "WorkBlock": points.items.work,
                 **points.splat_blocks(),
             },
-            {"window": window},
+            {"window": window, "room": points.room},
         )
         self._fill.run_indirect(points.items.work, window * dtype("Work").itemsize + ROWS_DISPATCH)
 

@@ -67,7 +67,7 @@ class RasterCells(CellSource):
                 "Eyes": band.target.eyes,
                 **points.splat_blocks(),
             },
-            {"first_triangle": first},
+            {"first_triangle": first, "room": points.room},
         )
         self._target_view.use()
         with conservative_raster(self._device, self._conservative):

@@ -3,6 +3,7 @@
 
 layout(local_size_x = BLOCK, local_size_y = GROUP_BLOCKS) in;
 
+#include "common/half.glsl"
 #include "shade/surface.glsl"
 #include "shade/visible.glsl"
 
@@ -14,5 +15,5 @@ void main() {
     Surface surface = surface_at(seen.triangle, seen.pixel.z, frame.band_first + seen.pixel.y, seen.pixel.x);
     vec4 over = shade(surface);
     vec4 under = imageLoad(view_images, seen.pixel);
-    imageStore(view_images, seen.pixel, vec4(mix(under.rgb, over.rgb, over.a), 1.0));
+    imageStore(view_images, seen.pixel, vec4(nearest_half(mix(under.rgb, over.rgb, over.a)), 1.0));
 }

@@ -1,10 +1,7 @@
 // What views share of a surface's light, in four words: scattered and sent radiance and roughness in halves; the square
 // root of f0 in thirds of a word, and whether there is gloss; the normal in 24 bits and occlusion in a byte.
 
-// To the nearest half float, which conversion then keeps: software devices cut.
-vec4 nearest_half(vec4 x) {
-    return uintBitsToFloat(floatBitsToUint(x) + 0x1000u & ~0x1FFFu);
-}
+#include "common/half.glsl"
 
 uvec4 packed_matte(Matte matte) {
     vec4 radiance_rough = nearest_half(vec4(min(matte.radiance, MOST_RADIANCE), matte.roughness));
