@@ -42,9 +42,9 @@ IDEAS: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Contender:
-    """A technique, as ``lfdpr``, ``lfdpr:PRESET`` or ``mvr:VARIANT``, and a filter of the panel.
-    application: what it makes instead of a panel image, of `applications.APPLICATIONS`; idea: what
-    it does otherwise, of IDEAS."""
+    """A technique, as ``lfdpr``, ``lfdpr:PRESET``, ``exact`` or ``mvr:VARIANT``, and the panel's
+    filter. application: what it makes instead of a panel image, of `applications.APPLICATIONS`;
+    idea: what it does otherwise, of IDEAS."""
 
     technique: str
     aa: str = "none"
@@ -100,10 +100,12 @@ def techniques(names: Sequence[str]) -> tuple[str, ...]:
             found[f"mvr:{detail or 'multipass'}"] = None
         elif kind == "lfdpr" and (not detail or detail in _PRESETS):
             found["lfdpr" if detail in ("", "default") else name] = None
+        elif name == "exact":
+            found[name] = None
         else:
             raise UsageError(
-                f"technique '{name}': unknown; use lfdpr, lfdpr:paper, {BEST_MVR}, {ALL_MVR} "
-                f"or mvr:VARIANT of {', '.join(VARIANTS)}"
+                f"technique '{name}': unknown; use lfdpr, lfdpr:paper, exact, {BEST_MVR}, "
+                f"{ALL_MVR} or mvr:VARIANT of {', '.join(VARIANTS)}"
             )
     return tuple(found)
 

@@ -59,7 +59,10 @@ def bench(
     ] = None,
     technique: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", help="lfdpr, lfdpr:paper, mvr:VARIANT, mvr:all or mvr:best."),
+        typer.Option(
+            metavar="NAME",
+            help="lfdpr, lfdpr:paper, exact, mvr:VARIANT, mvr:all or mvr:best.",
+        ),
     ] = None,
     rivals: Annotated[
         str | None,

@@ -16,6 +16,7 @@ class Technique(StrEnum):
     """How views are rendered."""
 
     LFDPR = "lfdpr"
+    EXACT = "exact"
     MVR = "mvr"
 
 

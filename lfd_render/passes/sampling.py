@@ -55,6 +55,8 @@ class Sampling:
 
 
 DEFAULT_SAMPLING = Sampling()
+# Slice tracks alone: nothing depends on how dense points are, and each pixel is shaded by its ray.
+EXACT_SAMPLING = Sampling(texture_limit=False)
 PAPER_SAMPLING = Sampling(
     lattice="paper",
     source="raster",

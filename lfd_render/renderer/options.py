@@ -16,6 +16,7 @@ from lfd_render.passes.sampling import (
     CULLINGS,
     DEFAULT_SAMPLING,
     DENSITIES,
+    EXACT_SAMPLING,
     LATTICES,
     PAPER_SAMPLING,
     POINT_SOURCES,
@@ -26,7 +27,7 @@ from lfd_render.passes.view_buffers import WINNERS
 from lfd_render.scene import Environment
 from lfd_render.techniques.mvr import DEFAULT_VARIANT, pipeline_of
 
-TECHNIQUES = ("lfdpr", "mvr")
+TECHNIQUES = ("lfdpr", "exact", "mvr")
 PRESETS = ("default", "paper", "gold")
 PROJECTIONS = ("shear", "general")
 ENVIRONMENTS = ("studio", "none")
@@ -38,8 +39,10 @@ MOST_RADIANCE = 65504.0  # what half floats hold
 
 @dataclass(frozen=True)
 class RenderOptions:
-    """How to render. view_size: upright views of (width, height); None: views that follow the
-    lenses, with as many rows as makes all views together as large as the panel. mvr: which variant
+    """How to render. technique: lfdpr; exact, by the same slices of triangles, with each pixel
+    shaded by its ray; or mvr, each view rasterised. view_size: upright views of (width, height);
+    None: views that follow the lenses, with as many rows as makes all views together as large as
+    the panel. mvr: which variant
     of technique mvr, one of `techniques.mvr.VARIANTS`. projection: how
     points reach the views, by the shear that parallel views share or by each view's own matrix.
     splat: how a pixel's nearest point is found, by 64-bit atomics, by two passes of 32-bit ones or
@@ -107,9 +110,11 @@ class RenderOptions:
         ):
             if choice not in choices:
                 raise UsageError(f"{name} '{choice}': unknown; use {' or '.join(choices)}")
-        if self.lod == "multiview" and self.technique == "mvr":
+        if self.lod == "multiview" and self.technique != "lfdpr":
             others = " or ".join(rule for rule in LOD_RULES if rule != "multiview")
-            raise UsageError(f"lod 'multiview': mvr has no points that views share; use {others}")
+            raise UsageError(
+                f"lod 'multiview': {self.technique} has no points that views share; use {others}"
+            )
         pipeline_of(self.mvr)  # which checks it
         if self.mvr != DEFAULT_VARIANT and self.technique != "mvr":
             raise UsageError(
@@ -182,12 +187,14 @@ class RenderOptions:
         if self.lod is not None:
             return self.lod
         if self.preset == "paper":
-            return "long-axis" if self.technique == "mvr" else "multiview"
+            return "multiview" if self.technique == "lfdpr" else "long-axis"
         return "anisotropic"
 
     @property
     def sampling(self) -> Sampling:
-        """The preset's sampling, with what was chosen apart from it."""
+        """The preset's sampling, with what was chosen apart from it; exact has one alone."""
+        if self.technique == "exact":
+            return EXACT_SAMPLING
         preset = PAPER_SAMPLING if self.preset == "paper" else DEFAULT_SAMPLING
         if self.lattice == "rows" and self.point_source is None:
             preset = replace(preset, source="compute")  # the only one that rows have
@@ -282,10 +289,9 @@ class RenderOptions:
                 "splat 'owned': cells of lattice 'paper' lie on no rows; use auto, two-pass or "
                 "int64"
             )
-        if self.splat != "auto" and self.technique != "lfdpr":
+        if self.splat != "auto" and self.technique == "mvr":
             raise UsageError(
-                f"splat '{self.splat}': technique '{self.technique}' does not splat; "
-                "use it with lfdpr"
+                f"splat '{self.splat}': technique 'mvr' does not splat; use it with lfdpr or exact"
             )
 
 

@@ -136,7 +136,7 @@ class Stage:
         plan, grid = self._plan, self._plan.grid
         points = _point_report(technique, choice)
         warnings = list(self._buffers.warnings)
-        if choice.technique == "lfdpr" and points["points"] == 0:
+        if choice.technique != "mvr" and points["points"] == 0:
             warnings.append("nothing of the scene can be seen through the window")
         report = {
             "technique": choice.technique,
@@ -177,7 +177,7 @@ class Stage:
             aa=plan.rule.aa,
             aa_light=choice.aa_light,
             supersample="x".join(map(str, choice.supersample)),
-            **(asdict(choice.sampling) if choice.technique == "lfdpr" else {}),
+            **(asdict(choice.sampling) if choice.technique != "mvr" else {}),
         )
         return Eia(pixels, linear, report, metadata, self.display.panel.mount)
 
@@ -198,7 +198,7 @@ def _fixed(choice: RenderOptions) -> RenderOptions:
 
 def _point_report(technique: Technique, choice: RenderOptions) -> dict[str, Any]:
     """What the report says of points: how they were made, how many, and what they took."""
-    if choice.technique != "lfdpr":
+    if choice.technique == "mvr":
         return {"points": 0, "splat": None}
     sampling = asdict(choice.sampling)
     report = {"point_source": sampling.pop("source"), **sampling, "splat": technique.winners}
