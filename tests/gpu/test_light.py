@@ -486,9 +486,9 @@ def test_seams_and_poles_do_not_show(device: Device, rng: np.random.Generator) -
             with passes(device, placed, rig, grid, camera, environment=environment) as opened:
                 image = opened.images()[0]
             lit = image[20:70, 50:110]
-            # Half floats of light below 2 step by 2⁻¹⁰; a smooth picture bends by less than that.
+            # Half floats of light below 2 step by 2⁻¹⁰, and rounding bends by up to two steps.
             bends = np.abs(np.diff(lit, 2, axis=0)).max(), np.abs(np.diff(lit, 2, axis=1)).max()
-            assert max(bends) < 6 * 2.0**-10
+            assert max(bends) <= 6 * 2.0**-10
 
 
 def turn_to(direction: Float64) -> Float64:
