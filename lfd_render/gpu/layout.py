@@ -240,6 +240,7 @@ CONSTANTS: dict[str, int] = {
     "NO_TRIANGLE": 0xFFFFFFFF,  # the word of a view pixel that shows the background
     "DOUBLE_SIDED": 1 << 16,
     "MOST_CELLS": 2048,  # of a triangle's lattice along a side, as the point-sampling view is large
+    "BOTH_SIDES": 1 << 21,  # bit of what TriangleTracks says (share/tracks.glsl)
     "STEPS_SHIFT": 10,
     "MOST_STEPS": 4096,  # between cells of a track, more than a window's columns
     "UNLIT": 1,  # flag of a material

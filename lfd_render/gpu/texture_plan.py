@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from lfd_render.errors import ResourceError
 from lfd_render.gpu.device import DeviceInfo
 
-# The environment, a list of cells or the images of a pass, and what geometry and materials are
-# fetched by: triangles, draws, three of vertices, materials.
+# The environment, what a pass goes through (blocks, or rows of points), and what geometry and
+# materials are fetched from: triangles, draws, vertices, their two kinds of attributes, materials.
 RESERVED_UNITS = 8
 _MOST_KINDS = 256  # that are merged pair by pair; more are first brought to steps of sizes
 _GIB = 1 << 30

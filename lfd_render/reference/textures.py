@@ -12,6 +12,7 @@ Float64 = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 MOST_ASPECT = 16  # of an ellipse that taps are as wide as
+TAPS_PER_WIDTH = 0.7  # of the ellipse's short axis, along its long one
 
 
 def linear_from_srgb(encoded: Float64) -> Float64:
@@ -154,11 +155,11 @@ def ellipses(dx: Float64, dy: Float64) -> tuple[Float64, Float64, Float64]:
 def _anisotropic(
     levels: Sequence[Float64], uv: Float64, dx: Float64, dy: Float64, wrap: tuple[str, str]
 ) -> Float64:
-    """The mean of taps as wide as the ellipse is short, or a texel, evenly along it, 0.7 for each
-    such width; they are wider where MOST_ASPECT widths do not reach."""
+    """The mean of taps as wide as the ellipse is short, or a texel, evenly along it,
+    TAPS_PER_WIDTH for each such width; they are wider where MOST_ASPECT widths do not reach."""
     long, short, direction = ellipses(dx, dy)
     ratio = np.clip(long / np.maximum(short, 1.0), 1.0, MOST_ASPECT)
-    count = np.ceil(0.7 * ratio)
+    count = np.ceil(TAPS_PER_WIDTH * ratio)
     lod = np.log2(np.maximum(long, 1e-6) / ratio)
     height, width = levels[0].shape[:2]
     total = np.zeros((len(uv), 4))

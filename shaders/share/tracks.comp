@@ -16,7 +16,6 @@ uniform int first_row;  // of the part of the band, and where it ends
 uniform int end_row;
 
 const float LEAST_DENSITY = 0.5;  // of a group's sparsest view over its densest
-const uint BOTH_SIDES = 1u << 21;  // as in tracks.glsl
 const float MOST_LEAN = 0.5;      // of a view's footprint over the middle view's, columns a row
 
 // The first view that sees the other side than the first view does.

@@ -6,8 +6,6 @@
 
 uniform usamplerBuffer TriangleTracks;  // of two triangles a texel
 
-const uint BOTH_SIDES = 1u << 21;
-
 uvec2 tracks_of(uint triangle) {
     uvec4 two = texelFetch(TriangleTracks, int(triangle >> 1));
     return (triangle & 1u) == 0u ? two.xy : two.zw;
@@ -27,14 +25,14 @@ uint groups_of(uvec2 tracks) {
 }
 
 uint group_of(uvec2 tracks, uint view) {
-    if ((tracks.x & BOTH_SIDES) != 0u) return view < tracks.x >> 22 ? 0u : 1u;
+    if ((tracks.x & uint(BOTH_SIDES)) != 0u) return view < tracks.x >> 22 ? 0u : 1u;
     return quotient(view * groups_of(tracks), uint(frame.views));
 }
 
 // The middle view of a group.
 uint middle_of(uvec2 tracks, uint group) {
     uint crossing = tracks.x >> 22, views = uint(frame.views), groups = groups_of(tracks);
-    if ((tracks.x & BOTH_SIDES) != 0u) return (group == 0u ? crossing : crossing + views) / 2u;
+    if ((tracks.x & uint(BOTH_SIDES)) != 0u) return (group == 0u ? crossing : crossing + views) / 2u;
     uint first = quotient(group * views + groups - 1u, groups), end = quotient((group + 1u) * views + groups - 1u, groups);
     return (first + end - 1u) / 2u;
 }

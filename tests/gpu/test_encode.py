@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from lfd_render import Renderer, Scene
 from lfd_render.gpu import raw as gl
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.memory import TextureArray
@@ -13,7 +14,7 @@ from lfd_render.passes.encode import Encode
 from lfd_render.reference import encode, encoded
 from lfd_render.reference.encode import encoded_float
 
-from .helpers import fill
+from .helpers import PAPER, few_lenses, fill
 
 pytestmark = pytest.mark.needs("gl")
 
@@ -98,3 +99,32 @@ def test_wrong_encodings_are_caught(
     pictures = encoded_by_device(device, linear)
     monkeypatch.setattr(encode, name, fault)
     assert wrong_levels(pictures, linear, 1.0) > 100
+
+
+@pytest.mark.parametrize(
+    "technique",
+    [
+        {"shade": "shared"},
+        {"shade": "ray"},
+        {"technique": "exact"},
+        {"technique": "mvr", "mvr": "multipass-deferred"},
+    ],
+    ids=lambda kind: "-".join(kind.values()),
+)
+def test_codes_are_those_of_linear_light(device: Device, technique: dict[str, str]) -> None:
+    """Pixels encoded where they are shaded, and the background beside them, as the panel image that
+    is asked for in linear light has them; the exposure may change from frame to frame."""
+    scene = Scene.load("builtin:spheres?triangles=4000")
+    display = few_lenses(PAPER, 40.0, (240, 135))
+    found = {}
+    for linear in (True, False):
+        with Renderer(device) as renderer:
+            for exposure in (1.0, 2.5):
+                eia = renderer.render(
+                    scene, display, views=6, linear=linear, exposure=exposure,
+                    background=(0.021, 0.37, 1.9), **technique,
+                )  # fmt: skip
+                found[linear, exposure] = eia.pixels
+    for exposure in (1.0, 2.5):
+        np.testing.assert_array_equal(found[False, exposure], found[True, exposure])
+    assert (found[True, 1.0] != found[True, 2.5]).mean() > 0.5  # control
