@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from lfd_render.bench.contenders import Contender
@@ -90,14 +89,15 @@ class Row:
         return statistics.median(self.cpu_ms) if self.cpu_ms else 0.0
 
     def times_faster(self, other: Row) -> float:
-        """The other's time over its own."""
-        return _ratio(other.frames_ms, self.frames_ms)
+        """The other's least time over its own: what else a machine does only adds to a frame, and
+        of all estimates this one is found again best (docs/performance.md)."""
+        return min(other.frames_ms) / min(self.frames_ms)
 
     def times_faster_by_cpu(self, other: Row) -> float | None:
         """The same of processor time; None where one's is not known."""
         if not (self.median_cpu_ms and other.median_cpu_ms):
             return None
-        return _ratio(other.cpu_ms, self.cpu_ms)
+        return min(other.cpu_ms) / min(self.cpu_ms)
 
     @property
     def spread(self) -> float:
@@ -116,18 +116,6 @@ class Row:
         return parts[kind]
 
 
-def _ratio(above: Sequence[float], below: Sequence[float]) -> float:
-    """Median over rounds of one's time over the other's in the same round, which leaves out what
-    slows a machine for longer than a round. Who has more frames has several in each."""
-    rounds = min(len(above), len(below))
-
-    def of_round(times: Sequence[float], index: int) -> float:
-        first, end = (len(times) * (index + n) // rounds for n in (0, 1))
-        return statistics.median(times[first:end])
-
-    return statistics.median(of_round(above, n) / of_round(below, n) for n in range(rounds))
-
-
 def unmeasured(group: Group, error: LfdError | MemoryError) -> list[Row]:
     """Rows of a group that nobody could do."""
     gap = str(error) or type(error).__name__
@@ -139,4 +127,4 @@ def unmeasured(group: Group, error: LfdError | MemoryError) -> list[Row]:
 def best_mvr(rows: list[Row]) -> Row | None:
     """The rasteriser of a group that counts: the fastest whose picture is right."""
     rivals = [row for row in rows if row.rasterises and row.valid]
-    return min(rivals, key=lambda row: row.median_ms, default=None)
+    return min(rivals, key=lambda row: min(row.frames_ms), default=None)

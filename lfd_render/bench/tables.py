@@ -41,10 +41,10 @@ def _head(settings: Mapping[str, Any]) -> str:
         f"{machine['driver']}, {machine['processor']}, {machine['cores']} cores. "
         f"Medians of {min(effort['least'], effort['rounds'])} to {effort['rounds']} frames of a "
         "turning scene, as many as a row's time allows; all rows of a group in turn; ± half the "
-        "interquartile range. Times are wall clock between finishes. × is the time of the best "
-        "multi-view rasterisation of the group over the row's in the same round, the median of all "
-        "rounds: more than 1 is faster than it; by processor time it follows in brackets where "
-        "that differs by a tenth. One of the frames timed is the picture that was checked."
+        "interquartile range. Times are wall clock between finishes. × is the least time of the "
+        "best multi-view rasterisation of the group over the row's least: more than 1 is faster "
+        "than it; by processor time it follows in brackets where that differs by a tenth. One of "
+        "the frames timed is the picture that was checked."
     )
 
 

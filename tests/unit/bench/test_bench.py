@@ -126,15 +126,21 @@ def test_time_left_follows_what_was_spent() -> None:
     assert (span(40), span(3900)) == ("40 s", "1 h 05 min")
 
 
-def test_ratios_are_those_of_rounds() -> None:
+def test_ratios_are_of_the_least_disturbed_frames() -> None:
     slow, fast = row("mvr:loop-4", 0.0), row("lfdpr", 0.0)
-    # The machine slows down: medians of all, 200 and 25, would say 8.
-    slow.frames_ms, fast.frames_ms = [100.0, 200.0, 300.0], [10.0, 10.0, 20.0, 30.0, 30.0, 30.0]
+    # A neighbour slows most frames of one: medians, 120 and 30, would say 4.
+    slow.frames_ms, fast.frames_ms = [100.0, 120.0, 130.0], [30.0, 10.0, 31.0]
     assert fast.times_faster(slow) == 10.0
     assert slow.times_faster(fast) == 0.1
     assert fast.times_faster_by_cpu(slow) is None
-    slow.cpu_ms, fast.cpu_ms = [30.0], [10.0]
+    slow.cpu_ms, fast.cpu_ms = [45.0, 30.0], [10.0, 12.0]
     assert fast.times_faster_by_cpu(slow) == 3.0
+
+
+def test_the_best_rasteriser_has_the_least_frame() -> None:
+    steady, disturbed = row("mvr:loop-4", 100.0), row("mvr:multipass", 0.0)
+    disturbed.frames_ms = [80.0, 150.0, 150.0]
+    assert best_mvr([row("lfdpr", 10.0), steady, disturbed]) is disturbed
 
 
 def test_two_runs_ratios_are_compared_by_the_same_rasteriser(tmp_path: Path) -> None:
