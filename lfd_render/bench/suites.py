@@ -192,15 +192,14 @@ def _triangles(axes: Axes) -> list[Group]:
 
 
 def _views(axes: Axes) -> list[Group]:
-    # All views of one size, whatever their number, as S5 and S12 ask.
+    """Upright views of one size, whatever their number: a display's own have as many pixels in
+    all as its panel, so that more of them cost no more."""
+    size = axes.main_size or axes.usual_size
     return [
-        _group(
-            axes, "views", _main(axes, s), _few(axes), views=n,
-            size=None if n == axes.main_views else axes.main_size or axes.usual_size,
-        )
+        _group(axes, "views", _main(axes, s), _few(axes), views=n, size=size)
         for s in axes.scenes
         for n in (axes.main_views, *axes.views)
-    ]  # fmt: skip
+    ]
 
 
 def _error(axes: Axes) -> list[Group]:
