@@ -88,7 +88,7 @@ def filling(folder: Path) -> Iterator[Path]:
 def remove_others(folder: Path, written: Sequence[Path], what: str = "view") -> None:
     """Remove views, or other numbered pictures, of an earlier run, which are not among those
     written, and say so; with views also what `unweave` wrote about its own."""
-    named = re.compile(rf"{what}_\d{{3,}}\.png")
+    named = re.compile(rf"{what}_(\d{{3,}}|r\d{{2,}}_c\d{{3,}})\.png")
     older = [f for f in folder.iterdir() if named.fullmatch(f.name) and f not in written]
     for file in older:
         file.unlink(missing_ok=True)

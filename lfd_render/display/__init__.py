@@ -5,7 +5,14 @@ from lfd_render.display.grid import ViewGrid
 from lfd_render.display.phase import PhaseTables, view_index
 from lfd_render.display.profile import DisplayProfile, shipped_profiles
 from lfd_render.display.reconstruction import Reconstruction
-from lfd_render.display.rig import Rig, eye_from_slot, slot_from_angle, slot_from_eye
+from lfd_render.display.rig import (
+    Rig,
+    eye_from_slot,
+    eye_heights_mm,
+    seen_from_height,
+    slot_from_angle,
+    slot_from_eye,
+)
 
 __all__ = [
     "Camera",
@@ -16,6 +23,8 @@ __all__ = [
     "ViewGrid",
     "comfortable_depth_mm",
     "eye_from_slot",
+    "eye_heights_mm",
+    "seen_from_height",
     "shipped_profiles",
     "slot_from_angle",
     "slot_from_eye",

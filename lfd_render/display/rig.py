@@ -1,7 +1,8 @@
 """The cameras of a display: where the eye of each view stands, and its projection.
 
 All eyes stand on a line at the viewing distance D and look through one window, the panel
-(off-axis frusta, never toed-in). A view's place x under its lens, from −½ to ½, and its eye
+(off-axis frusta, never toed-in). Arrays of cameras are several such lines, one above the other
+(`seen_from_height`). A view's place x under its lens, from −½ to ½, and its eye
 s_i follow one of three rules:
 
     lens     s = D·tan(asin(n·sin(atan(2x·tan(asin(sin(cone/2)/n))))))     refraction included
@@ -98,6 +99,30 @@ class Rig:
 def _rig(profile: DisplayProfile, eye_x_mm: Float64) -> Rig:
     near_mm = NEAR_FRACTION * profile.distance_mm
     return Rig(eye_x_mm, profile.distance_mm, profile.size_mm, near_mm)
+
+
+def eye_heights_mm(profile: DisplayProfile, rows: int, cone_rad: float) -> Float64:
+    """Heights of so many lines of eyes above the panel's centre, the highest first: at the centres
+    of equal parts of a cone, as eyes of spacing `angle` stand."""
+    if rows < 1:
+        raise UsageError(f"rows is {rows}; it should be at least 1")
+    if not 0 < cone_rad < np.pi:
+        raise UsageError(
+            f"vertical cone is {np.degrees(cone_rad):g} degrees; it should be above 0 and below 180"
+        )
+    slot = 0.5 - (np.arange(rows) + 0.5) / rows
+    return np.asarray(profile.distance_mm * np.tan(cone_rad * slot))
+
+
+def seen_from_height(height_mm: float, distance_mm: float) -> Float64:
+    """What takes display space to where eyes at height h above the panel's centre see it as eyes
+    at height 0 would, [4, 4]: y − (h/D)·z, the shear identity in y. The window, depths, and what
+    eyes on one line share stay as they are."""
+    if not np.isfinite(height_mm):
+        raise UsageError(f"height is {height_mm}; it should be finite")
+    shear = np.eye(4)
+    shear[1, 2] = -height_mm / distance_mm
+    return shear
 
 
 def check_angle(angle_rad: float) -> None:

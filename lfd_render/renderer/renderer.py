@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from types import TracebackType
@@ -11,7 +11,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lfd_render.display import Camera, DisplayProfile, Reconstruction, Rig, ViewGrid
+from lfd_render.display import (
+    Camera,
+    DisplayProfile,
+    Reconstruction,
+    Rig,
+    ViewGrid,
+    seen_from_height,
+)
 from lfd_render.errors import CancelledError, ResourceError, SceneError, UsageError
 from lfd_render.gpu.clock import StageClock
 from lfd_render.gpu.device import Device
@@ -190,14 +197,17 @@ class Renderer:
         views: int | None = None,
         rig: Rig | None = None,
         *,
+        heights_mm: Sequence[float] | None = None,
         pose: Pose | None = None,
         progress: Progress | None = None,
         **options: Any,
     ) -> NDArray[np.uint8]:
         """Render single upright views, uint8 [view, y, x, 3], view 0 leftmost.
 
-        rig: eyes other than the display's own, for example `Rig.single(display, angle)`. The view
-        size is by default one column a lens and the default rows. Otherwise as `render`.
+        rig: eyes other than the display's own, for example `Rig.single(display, angle)`.
+        heights_mm: of such lines of eyes above the panel's centre, for arrays of cameras; the
+        pictures are then [height, view, y, x, 3]. The view size is by default one column a lens
+        and the default rows. Otherwise as `render`.
         """
         _check_kinds(scene, display, camera, pose)
         choice = choose(views, options)
@@ -208,11 +218,15 @@ class Renderer:
         size = choice.view_size or upright_size(display, display.views)
         plan = plan_views(display, choice, rig, size)
         camera = camera or camera_for(scene, display)
+        heights = (0.0,) if heights_mm is None else tuple(map(float, heights_mm))
+        shears = [seen_from_height(height, display.distance_mm) for height in heights]
         self._end_stage()
         with self._call():
-            return self._views(
-                scene, display, camera, plan, choice, pose=pose, progress=progress or _ignored
-            )
+            pictures = self._views(
+                scene, display, camera, plan, choice,
+                shears=shears, pose=pose, progress=progress or _ignored,
+            )  # fmt: skip
+        return pictures[0] if heights_mm is None else pictures
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -227,11 +241,13 @@ class Renderer:
         plan: ViewPlan,
         choice: RenderOptions,
         *,
+        shears: list[NDArray[np.float64]],
         pose: Pose | None,
         progress: Progress,
     ) -> NDArray[np.uint8]:
+        """Of each line of eyes, [line, view, y, x, 3]; shears: what takes display space to them."""
         grid = plan.grid
-        _check_size(plan)
+        _check_size(plan, lines=len(shears))
         if pose is None:
             check_in_front(scene, camera, plan.rig)
         buffers = self._upload(scene, choice, Timings())
@@ -241,23 +257,23 @@ class Renderer:
         average = Average(self.device, target, eyes=plan.eyes, times=plan.times)
         averaged = max(plan.eyes, plan.times) > 1
         encode = Encode(self.device, grid.columns, target.band_rows // plan.times)
-        pictures = np.empty((plan.views, grid.rows, grid.columns, 3), np.uint8)
+        pictures = np.empty((len(shears), plan.views, grid.rows, grid.columns, 3), np.uint8)
         clock = StageClock(self.device)
-        technique.begin(
-            Placement(camera.display_from_world(display.size_mm), choice.background), clock
-        )
-        technique.warm_up(clock)
-        complete = False
-        while not complete:
-            for index, band in enumerate(target.bands):
-                progress(index / len(target.bands))
-                technique.render(band, clock)
-                found = average(band) if averaged else band.view_images()
-                rows = slice(*found.shown)
-                for view in range(plan.views):
-                    encode(found.images, view, choice.exposure)
-                    pictures[view, rows] = encode.read()[: rows.stop - rows.start]
-            complete = technique.complete()
+        display_from_world = camera.display_from_world(display.size_mm)
+        for line, shear in enumerate(shears):
+            technique.begin(Placement(shear @ display_from_world, choice.background), clock)
+            technique.warm_up(clock)
+            complete = False
+            while not complete:
+                for index, band in enumerate(target.bands):
+                    progress((line + index / len(target.bands)) / len(shears))
+                    technique.render(band, clock)
+                    found = average(band) if averaged else band.view_images()
+                    rows = slice(*found.shown)
+                    for view in range(plan.views):
+                        encode(found.images, view, choice.exposure)
+                        pictures[line, view, rows] = encode.read()[: rows.stop - rows.start]
+                complete = technique.complete()
         self.device.check()
         for owner in (technique, encode, average):
             owner.release()
@@ -447,9 +463,9 @@ def _check_kinds(scene: object, display: object, camera: object, pose: object = 
     check_frame(camera, pose)
 
 
-def _check_size(plan: ViewPlan) -> None:
+def _check_size(plan: ViewPlan, lines: int = 1) -> None:
     """Raise ResourceError for more view pixels than anyone waits for."""
-    eyes, grid = plan.rig.views, plan.rendered
+    eyes, grid = plan.rig.views * lines, plan.rendered
     if eyes > MOST_EYES:
         raise UsageError(f"views: {eyes} eyes are too many; use at most {MOST_EYES}")
     pixels = eyes * grid.columns * grid.rows

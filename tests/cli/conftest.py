@@ -110,7 +110,9 @@ class FakeRenderer:
         self._record(scene=scene, display=display, camera=camera, **options)
         count = options["views"] or display.views
         shades = np.arange(count, dtype=np.uint8)[:, None, None, None]
-        return np.broadcast_to(shades, (count, 14, 24, 3))
+        heights = options.get("heights_mm")
+        lines = () if heights is None else (len(heights),)
+        return np.broadcast_to(shades, (*lines, count, 14, 24, 3))
 
     def weave(self, views: Quilt | Unwoven, display: DisplayProfile, **choices: str) -> Eia:
         self._record(views=views, display=display, **choices)

@@ -35,6 +35,42 @@ def test_views_are_numbered_from_the_left(
     assert texts[0]["lfd:profile"] == "small"
 
 
+def test_arrays_are_numbered_from_the_top_left(
+    command: Command, renderer: FakeRenderer, scene: Path, display: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "array"
+    arguments = ("views", scene, "-o", folder, "-d", display, "--views", 2, "--json")
+    result = command(*arguments, "--rows", 3, "--vertical-cone", 30)
+    names = [f"view_r{row:02d}_c{view:03d}.png" for row in range(3) for view in range(2)]
+    assert result.json["output"] == [str(folder / name) for name in names]
+    assert (result.json["rows"], result.json["views"]) == (3, 2)
+    text = read_png_text(folder / names[5])
+    assert (text["lfd:row"], text["lfd:view"], text["lfd:views"]) == ("2", "1", "2")
+    heights = renderer.calls[-1]["heights_mm"]
+    assert heights[0] > 0 == heights[1] > heights[2]
+    plain = command(*arguments)  # which ends the array that was there
+    assert sorted(path.name for path in folder.iterdir()) == ["view_000.png", "view_001.png"]
+    assert "6 views of an earlier run" in plain.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "message"),
+    [
+        (("--vertical-cone", 20), 2, "--vertical-cone: is for rows of cameras; give --rows, too"),
+        (("--rows", 2, "--vertical-cone", 180), 2, "vertical cone is 180 degrees"),
+        (("--rows", 0), 2, "'--rows': Input should be greater than or equal to 1"),
+    ],
+)
+def test_what_is_no_array(
+    command: Command, scene: Path, tmp_path: Path, options: tuple[object, ...], code: int,
+    message: str,
+) -> None:  # fmt: skip
+    result = command("views", scene, "-o", tmp_path / "views", *options)
+    assert result.code == code
+    assert message in result.stderr
+    assert not (tmp_path / "views").exists()
+
+
 def test_views_end_what_was_told_of_others(
     command: Command, scene: Path, display: Path, tmp_path: Path
 ) -> None:

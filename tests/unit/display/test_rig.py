@@ -5,7 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from lfd_render.display import DisplayProfile, Rig, slot_from_angle
+from lfd_render.display import (
+    DisplayProfile,
+    Rig,
+    eye_heights_mm,
+    seen_from_height,
+    slot_from_angle,
+)
 from lfd_render.display.model import Spacing
 from lfd_render.errors import UsageError
 
@@ -94,3 +100,30 @@ def test_single_eye_stands_at_its_angle() -> None:
     for angle in (math.pi / 2, -2.0, math.nan):
         with pytest.raises(UsageError, match="between -90 and 90"):
             Rig.single(profile(), angle)
+
+
+def test_heights_stand_at_equal_angles_from_the_top() -> None:
+    profile = DisplayProfile.load("gavane-2024-tilted-4k")
+    heights = eye_heights_mm(profile, 4, math.radians(40))
+    angles = np.degrees(np.arctan(heights / profile.distance_mm))
+    np.testing.assert_allclose(angles, [15.0, 5.0, -5.0, -15.0])
+    assert eye_heights_mm(profile, 1, 1.0).tolist() == [0.0]
+    with pytest.raises(UsageError, match="rows is 0"):
+        eye_heights_mm(profile, 0, 1.0)
+    with pytest.raises(UsageError, match="vertical cone is 180 degrees"):
+        eye_heights_mm(profile, 2, math.pi)
+
+
+def test_seen_from_a_height_by_the_shear_in_y() -> None:
+    """A point's place in the window is where the line from the raised eye to it meets z = 0."""
+    distance, height, eye_x = 600.0, 130.0, -70.0
+    point = np.array([12.0, -31.0, 45.0])
+    eye = np.array([eye_x, height, distance])
+    met = eye + (point - eye) * distance / (distance - point[2])
+    sheared = (seen_from_height(height, distance) @ [*point, 1.0])[:3]
+    level = np.array([eye_x, 0.0, distance])
+    np.testing.assert_allclose(
+        level + (sheared - level) * distance / (distance - sheared[2]), met, atol=1e-12
+    )
+    with pytest.raises(UsageError, match="height is inf"):
+        seen_from_height(math.inf, distance)
