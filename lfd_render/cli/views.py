@@ -120,7 +120,7 @@ def _heights_mm(
     if rows is None:
         return None
     cone_rad = profile.cone_rad if cone_deg is None else math.radians(cone_deg)
-    return eye_heights_mm(profile, rows, cone_rad).tolist()
+    return list(map(float, eye_heights_mm(profile, rows, cone_rad)))
 
 
 def _write(folder: Path, pictures: NDArray[np.uint8], text: dict[str, str]) -> list[Path]:
