@@ -42,7 +42,7 @@ Told = Callable[[str], None]
 _ELSEWHERE_RAD = 0.35  # how far the frame before the one that is judged is turned away
 _HOPELESS = 2.0  # times as slow as the fastest of a ranking so far
 _MOST_DIFFERENT = 0.02  # of buffers' pixels; on edges points and rasterisation may differ
-_MOST_MISSED = 0.05  # of what a standard shows; its edges are finer than a rival's
+_MOST_MISSED = 0.1  # of what a standard shows; its edges are finer than a rival's, fibres most
 
 
 @dataclass(frozen=True)

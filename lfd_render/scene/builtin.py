@@ -27,19 +27,20 @@ class Builtin:
     defaults: Mapping[str, int]
 
 
-_TRIANGLES = (1_000, 10_000_000)
+_MOST_TRIANGLES = 30_000_000
+_TRIANGLES = (1_000, _MOST_TRIANGLES)
 
 BUILTINS: dict[str, Builtin] = {
     "atrium": Builtin(
         atrium,
-        {"triangles": (20_000, 10_000_000), "textures": (16, 4096)},
+        {"triangles": (20_000, _MOST_TRIANGLES), "textures": (16, 4096)},
         {"triangles": 1_000_000, "textures": 1024},
     ),
-    "car": Builtin(car, {"triangles": (20_000, 10_000_000)}, {"triangles": 300_000}),
+    "car": Builtin(car, {"triangles": (20_000, _MOST_TRIANGLES)}, {"triangles": 300_000}),
     "chart": Builtin(chart, {"triangles": _TRIANGLES}, {"triangles": 100_000}),
     "coconuts": Builtin(
         coconuts,
-        {"triangles": (50_000, 10_000_000), "textures": (16, 8192)},
+        {"triangles": (50_000, _MOST_TRIANGLES), "textures": (16, 8192)},
         {"triangles": 2_000_000, "textures": 2048},
     ),
     "gallery": Builtin(
