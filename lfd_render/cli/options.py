@@ -78,6 +78,7 @@ class Culling(StrEnum):
 class ShadePlace(StrEnum):
     """Where a pixel is shaded."""
 
+    AUTO = "auto"
     RAY = "ray"
     SHARED = "shared"
     POINT = "point"
@@ -221,8 +222,8 @@ StochasticCullingOption = Annotated[
 ShadeOption = Annotated[
     ShadePlace | None,
     typer.Option(
-        help="Where pixels are shaded: at their ray's hit, with what views share done once, or at "
-        "the point they show; else as the preset has it."
+        help="Where pixels are shaded: at their ray's hit, with what views share done once, the "
+        "quicker of these, or at the point they show; else as the preset has it."
     ),
 ]
 CameraOption = Annotated[

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from lfd_render.cli import options
@@ -19,11 +19,11 @@ from lfd_render.cli.inputs import (
     warn_of_light,
 )
 from lfd_render.cli.outputs import check_folder_output, filling, remove_others
-from lfd_render.display import eye_heights_mm
 from lfd_render.engine.choices import Choices
 from lfd_render.errors import UsageError
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from lfd_render.display import DisplayProfile
@@ -117,6 +117,8 @@ def _heights_mm(
     profile: DisplayProfile, rows: int | None, cone_deg: float | None
 ) -> list[float] | None:
     """Of each row of cameras, the highest first; None where there is no array."""
+    from lfd_render.display import eye_heights_mm  # noqa: PLC0415 (keeps --help quick)
+
     if rows is None:
         return None
     cone_rad = profile.cone_rad if cone_deg is None else math.radians(cone_deg)
@@ -132,7 +134,7 @@ def _write(folder: Path, pictures: NDArray[np.uint8], text: dict[str, str]) -> l
     from lfd_render.panel.picture import write_png  # noqa: PLC0415 (keeps --help quick)
 
     names: dict[str, tuple[int, ...]] = {}
-    for index in np.ndindex(pictures.shape[:-3]):
+    for index in itertools.product(*map(range, pictures.shape[:-3])):
         place = f"{index[0]:03d}" if len(index) == 1 else f"r{index[0]:02d}_c{index[1]:03d}"
         names[f"view_{place}.png"] = index
     with filling(folder) as temporary:

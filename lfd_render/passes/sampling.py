@@ -16,7 +16,7 @@ LATTICES = ("rows", "paper")
 POINT_SOURCES = ("compute", "raster")
 DENSITIES = ("lfd", "isotropic")
 CULLINGS = ("exact", "vertices")
-SHADE_PLACES = ("ray", "shared", "point")
+SHADE_PLACES = ("auto", "ray", "shared", "point")
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Sampling:
     triangles. stochastic_culling: of triangles below a tenth of a pixel (EPR section 3.2), which
     punches holes. shade: where a pixel's ray meets the surface; or shared, what does not depend on
     the eye once for the views that see it alike; or at the point that owns the pixel, one colour a
-    splat and view, as in the paper.
+    splat and view, as in the paper; auto: shared where that takes less time (`share.pays`).
     """
 
     lattice: str = "rows"

@@ -202,7 +202,7 @@ class RenderOptions:
             preset = replace(preset, lattice="paper")
         lattice = self.lattice or preset.lattice
         if self.preset == "default" and lattice == "rows":
-            preset = replace(preset, shade="shared")
+            preset = replace(preset, shade="auto")
         chosen: dict[str, Any] = {
             "lattice": self.lattice,
             "source": self.point_source,

@@ -177,7 +177,7 @@ class Stage:
             aa=plan.rule.aa,
             aa_light=choice.aa_light,
             supersample="x".join(map(str, choice.supersample)),
-            **(asdict(choice.sampling) if choice.technique != "mvr" else {}),
+            **(asdict(technique.sampling) if technique.sampling else {}),
         )
         return Eia(pixels, linear, report, metadata, self.display.panel.mount)
 
@@ -198,9 +198,9 @@ def _fixed(choice: RenderOptions) -> RenderOptions:
 
 def _point_report(technique: Technique, choice: RenderOptions) -> dict[str, Any]:
     """What the report says of points: how they were made, how many, and what they took."""
-    if choice.technique == "mvr":
+    if technique.sampling is None:
         return {"points": 0, "splat": None}
-    sampling = asdict(choice.sampling)
+    sampling = asdict(technique.sampling)
     report = {"point_source": sampling.pop("source"), **sampling, "splat": technique.winners}
     if not choice.effort:
         return {"points": technique.count_points() if choice.counted else None, **report}

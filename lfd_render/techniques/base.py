@@ -7,6 +7,7 @@ from typing import Protocol
 
 from lfd_render.gpu.clock import StageClock
 from lfd_render.passes.placement import Placement
+from lfd_render.passes.sampling import Sampling
 from lfd_render.passes.view_target import Band, ViewTarget
 
 
@@ -31,6 +32,11 @@ class Technique(Protocol):
     @property
     def winners(self) -> str | None:
         """How points' winners are found; None where nothing is splatted."""
+        ...
+
+    @property
+    def sampling(self) -> Sampling | None:
+        """How points are made and shaded, all of it settled; None where there are none."""
         ...
 
     def begin(self, placement: Placement, clock: StageClock) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -19,7 +20,7 @@ from lfd_render.passes.raster_cells import RasterCells
 from lfd_render.passes.sample import PointCloud, Sample
 from lfd_render.passes.sampling import DEFAULT_SAMPLING, Points, PointSource, Sampling, Splatter
 from lfd_render.passes.shade import Shade
-from lfd_render.passes.share import SharedShade
+from lfd_render.passes.share import SharedShade, pays
 from lfd_render.passes.splat import Splat, view_lanes
 from lfd_render.passes.splat_cells import SplatCells
 from lfd_render.passes.transform import Transform
@@ -56,6 +57,10 @@ class Lfdpr:
         lod: how textures are filtered, one of LOD_RULES.
         """
         cells = sampling.lattice == "paper"
+        if sampling.shade == "auto":
+            shared = not cells and pays(scene, target.rig.views)
+            sampling = replace(sampling, shade="shared" if shared else "ray")
+        self.sampling = sampling
         self.winners = choose_winners(device, winners, ownable=not (general or cells))
         int64 = self.winners == "int64"
         self.target = target

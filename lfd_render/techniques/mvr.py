@@ -62,6 +62,7 @@ class Rasterised:
     """transform, then what a subclass renders of each band."""
 
     winners = None
+    sampling = None
 
     def __init__(self, device: Device, scene: SceneBuffers, target: ViewTarget) -> None:
         self.target = target

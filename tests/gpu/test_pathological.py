@@ -1,5 +1,5 @@
-"""Scenes made to break a renderer: layer upon layer, all on one row, dust and needles. A full run has a
-million triangles of each."""
+"""Scenes made to break a renderer: layer upon layer, all on one row, dust and needles. A full run
+has a million triangles of each."""
 
 from collections.abc import Callable
 from typing import Any
@@ -86,7 +86,7 @@ def scene_with(make: Callable[..., Corners], count: int) -> tuple[Scene, Corners
 
 def seen(renderer: Renderer, scene: Scene, size: tuple[int, int], **options: Any) -> NDArray:
     """Pictures, within bounds of memory: points are made in windows of so many, whatever their
-    number, so that only triangles and their vertices take room for each: 400 bytes is twice that."""
+    number, so that only triangles and vertices take room for each: 400 bytes is twice that."""
     pictures = renderer.views(
         scene, DISPLAY, millimetre_camera(DISPLAY.size_mm), views=VIEWS, view_size=size, **options
     )

@@ -3,6 +3,7 @@
 import dataclasses
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -179,3 +180,24 @@ def lit_spheres() -> Scene:
     sun = Light("sun", "directional", np.eye(4), (1.0, 0.9, 0.8), 2.0)
     lamp = Light("lamp", "point", place, (0.6, 0.8, 1.0), 0.3 * extent**2)
     return dataclasses.replace(scene, lights=(sun, lamp))
+
+
+def test_what_is_quicker_is_chosen(renderer: Renderer) -> None:
+    """Sharing pays where there are textures to filter, or many lights."""
+    display = DisplayProfile.load(PAPER)
+    plain = Scene.load("builtin:car?triangles=20000")
+    lights = tuple(Light(str(i), "directional", np.eye(4)) for i in range(8))
+    small: dict[str, Any] = {"view_size": (48, 36), "counted": False}
+    for scene, views, expected in (
+        (plain, 3, "ray"),
+        (dataclasses.replace(plain, lights=lights[:7]), 3, "ray"),
+        (dataclasses.replace(plain, lights=lights), 3, "shared"),
+        (Scene.load("builtin:gallery?triangles=1000&textures=16"), 3, "shared"),
+        (Scene.load("builtin:gallery?triangles=1000&textures=16"), 1, "ray"),
+    ):
+        chosen = renderer.render(scene, display, views=views, **small)
+        asked = renderer.render(scene, display, views=views, shade=expected, **small)
+        np.testing.assert_array_equal(chosen.pixels, asked.pixels)
+        assert chosen.report["shade"] == chosen.metadata["lfd:shade"] == expected
+    paper = renderer.render(plain, display, views=3, lattice="paper", shade="auto", **small)
+    assert paper.report["shade"] == "ray"

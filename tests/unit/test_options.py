@@ -11,7 +11,7 @@ from lfd_render.renderer.options import choose
 
 
 def test_presets_choose_the_sampling() -> None:
-    assert RenderOptions().sampling == dataclasses.replace(DEFAULT_SAMPLING, shade="shared")
+    assert RenderOptions().sampling == dataclasses.replace(DEFAULT_SAMPLING, shade="auto")
     assert RenderOptions(preset="gold").sampling == DEFAULT_SAMPLING
     assert RenderOptions(preset="paper").sampling == PAPER_SAMPLING
 
@@ -35,7 +35,7 @@ def test_what_is_not_chosen_follows_from_what_is(
 ) -> None:
     sampling = RenderOptions(**options).sampling
     assert (sampling.lattice, sampling.source) == (lattice, source)
-    assert sampling.shade != "shared"  # which is the default preset's, on rows
+    assert sampling.shade != "auto"  # which is the default preset's, on rows
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_what_is_not_chosen_follows_from_what_is(
         ({"point_source": "rays"}, "point source 'rays': unknown; use compute or raster"),
         ({"density": "high"}, "density 'high': unknown; use lfd or isotropic"),
         ({"culling": "all"}, "culling 'all': unknown; use exact or vertices"),
-        ({"shade": "pixel"}, "shade 'pixel': unknown; use ray or shared or point"),
+        ({"shade": "pixel"}, "shade 'pixel': unknown; use auto or ray or shared or point"),
         ({"lattice": "paper", "shade": "shared"}, "shade 'shared': what rows cut"),
         ({"lattice": "rows", "point_source": "raster"}, "rows are cut in compute"),
         ({"lattice": "paper", "projection": "general"}, "use it with lattice 'rows'"),
