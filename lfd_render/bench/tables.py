@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from lfd_render.bench.contenders import PLAIN_MVR
@@ -204,6 +204,16 @@ def _by_size(found: list[list[Row]]) -> str:
     return "\n".join(lines)
 
 
+def _beside_lfdpr(found: list[list[Row]]) -> Iterator[tuple[Row, str]]:
+    """Rows that count, each with its frame and how many of LFDPR's that is, two cells."""
+    for rows in found:
+        ours = next((r for r in rows if r.contender == "lfdpr" and r.valid), None)
+        for row in rows:
+            if row.valid:
+                share = f"{ours.times_faster(row):.2f} ×" if ours else ""
+                yield row, f"{_ms(row.median_ms)} ± {100 * row.spread:.0f} % | {share}"
+
+
 def _ideas(found: list[list[Row]]) -> str:
     """What each idea of LFDPR gives."""
     lines = [
@@ -211,17 +221,11 @@ def _ideas(found: list[list[Row]]) -> str:
         "SSIM (view) |",
         "|---" * 7 + "|",
     ]
-    for rows in found:
-        base = next((r for r in rows if r.contender == "lfdpr" and r.valid), None)
-        for row in rows:
-            if row.valid:
-                share = f"{row.median_ms / base.median_ms:.2f} ×" if base else ""
-                points = f"{row.points:,}" if row.points else ""
-                lines.append(
-                    f"| {scene_name(row)} | {row.contender} | {points} | "
-                    f"{_ms(row.median_ms)} ± {100 * row.spread:.0f} % | {share} | "
-                    f"{_quality(row)} |"
-                )
+    lines += [
+        f"| {scene_name(row)} | {row.contender} | {f'{row.points:,}' if row.points else ''} | "
+        f"{frame} | {_quality(row)} |"
+        for row, frame in _beside_lfdpr(found)
+    ]
     return "\n".join(lines)
 
 
@@ -246,16 +250,10 @@ def _sweep(found: list[list[Row]]) -> str:
 def _outside(found: list[list[Row]]) -> str:
     """Programs from outside, against LFDPR's whole frame."""
     lines = ["| Scene | Method | frame, ms | of lfdpr's | leaves out |", "|---" * 5 + "|"]
-    for rows in found:
-        ours = next((r for r in rows if r.technique == "lfdpr" and r.valid), None)
-        for row in rows:
-            if row.valid:
-                share = f"{row.median_ms / ours.median_ms:.2f} ×" if ours else ""
-                lines.append(
-                    f"| {scene_name(row)} | {row.contender} | "
-                    f"{_ms(row.median_ms)} ± {100 * row.spread:.0f} % | {share} | "
-                    f"{row.leaves_out} |"
-                )
+    lines += [
+        f"| {scene_name(row)} | {row.contender} | {frame} | {row.leaves_out} |"
+        for row, frame in _beside_lfdpr(found)
+    ]
     return "\n".join(lines)
 
 
@@ -265,7 +263,7 @@ def _catalogue(found: list[list[Row]]) -> str:
     for rows in found:
         plain = next((r for r in rows if r.technique == "mvr:multipass" and r.valid), None)
         for row in sorted((r for r in rows if r.valid), key=lambda r: r.median_ms):
-            share = f"{row.median_ms / plain.median_ms:.2f}" if plain else ""
+            share = f"{plain.times_faster(row):.2f}" if plain else ""
             lines.append(
                 f"| {scene_name(row)} | {row.views} | {row.technique.removeprefix('mvr:')} | "
                 f"{_notation(row)} | {_ms(row.median_ms)} ± {100 * row.spread:.0f} % | {share} | "
