@@ -241,6 +241,3 @@ def test_both_techniques_light_alike(
     # hardware are off by less than a level.
     unlike = np.abs(pictures[0] - pictures[1]).max(axis=-1) > 1.5 / 255
     assert unlike.mean() < 0.005
-
-
-# ---- environments -----------------------------------------------------------------------------
