@@ -25,6 +25,7 @@ IDEAS: dict[str, dict[str, Any]] = {
     "stochastic culling": {"stochastic_culling": True},
     "culling by vertices": {"culling": "vertices"},
     "shade by rays": {"shade": "ray"},
+    "shade shared": {"shade": "shared"},
     "shade at points": {"shade": "point"},
     "lattice paper": {"lattice": "paper"},
     "lattice paper, isotropic": {"lattice": "paper", "density": "isotropic"},

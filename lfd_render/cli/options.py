@@ -222,8 +222,8 @@ StochasticCullingOption = Annotated[
 ShadeOption = Annotated[
     ShadePlace | None,
     typer.Option(
-        help="Where pixels are shaded: at their ray's hit, with what views share done once, the "
-        "quicker of these, or at the point they show; else as the preset has it."
+        help="Where pixels are shaded: at their ray's hit, shared where views see a place alike, "
+        "auto for the quicker of these, or at the point they show; else as the preset has it."
     ),
 ]
 CameraOption = Annotated[

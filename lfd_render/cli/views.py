@@ -40,12 +40,12 @@ def views(
         ),
     ],
     display: options.DisplayOption = options.DEFAULT_DISPLAY,
-    rows: Annotated[
+    camera_rows: Annotated[
         int | None,
         typer.Option(
             min=1,
             metavar="N",
-            help="Of cameras, one above the other: view_r00_c000.png is the top leftmost.",
+            help="Of an array of cameras: view_r00_c000.png is the top leftmost.",
         ),
     ] = None,
     vertical_cone: Annotated[
@@ -60,8 +60,8 @@ def views(
     cameras, rows of them.
     """
     options.check_device(device)
-    if vertical_cone is not None and rows is None:
-        raise UsageError("--vertical-cone: is for rows of cameras; give --rows, too")
+    if vertical_cone is not None and camera_rows is None:
+        raise UsageError("--vertical-cone: is for rows of cameras; give --camera-rows, too")
     folder = check_folder_output(output)
 
     watch = Stopwatch()
@@ -70,7 +70,7 @@ def views(
         loaded = load_scene(scene)
         window = choices.window(loaded, profile)
         warn_of_light(loaded, choices)
-        heights_mm = _heights_mm(profile, rows, vertical_cone)
+        heights_mm = _heights_mm(profile, camera_rows, vertical_cone)
 
     from lfd_render.renderer import Renderer  # noqa: PLC0415 (keeps --help quick)
 
@@ -91,7 +91,7 @@ def views(
             "lfd:preset": choices.preset,
             "lfd:seed": str(choices.seed),
         }
-        files = _write(folder, pictures, text)
+        files = _write(folder, pictures, text, heights_mm)
 
     if json:
         print_json(
@@ -101,7 +101,7 @@ def views(
                 "technique": choices.technique,
                 "preset": choices.preset,
                 "views": pictures.shape[-4],
-                "rows": rows or 1,
+                "heights_mm": heights_mm,
                 "view_size": [pictures.shape[-2], pictures.shape[-3]],
                 "seed": choices.seed,
                 "camera": window.to_json_dict(),
@@ -109,7 +109,7 @@ def views(
                 "timings_ms": watch.finish(),
             }
         )
-    many = f"{rows} × {pictures.shape[-4]}" if rows else str(len(files))
+    many = f"{camera_rows} × {pictures.shape[-4]}" if camera_rows else str(len(files))
     say(f"{folder}: {many} views of {pictures.shape[-2]} × {pictures.shape[-3]}")
 
 
@@ -125,9 +125,14 @@ def _heights_mm(
     return list(map(float, eye_heights_mm(profile, rows, cone_rad)))
 
 
-def _write(folder: Path, pictures: NDArray[np.uint8], text: dict[str, str]) -> list[Path]:
-    """Write uint8 [view, y, x, 3] as view_000.png and so on, or [row, view, y, x, 3] as
-    view_r00_c000.png, with text; the files in that order.
+def _write(
+    folder: Path,
+    pictures: NDArray[np.uint8],
+    text: dict[str, str],
+    heights_mm: list[float] | None,
+) -> list[Path]:
+    """Write uint8 [view, y, x, 3] as view_000.png and so on, or [row, view, y, x, 3] of rows of
+    cameras at these heights as view_r00_c000.png, with text; the files in that order.
 
     All appear or none, in the place of all views of an earlier run.
     """
@@ -140,8 +145,8 @@ def _write(folder: Path, pictures: NDArray[np.uint8], text: dict[str, str]) -> l
     with filling(folder) as temporary:
         for name, index in names.items():
             about = {"lfd:view": str(index[-1])}
-            if len(index) > 1:
-                about["lfd:row"] = str(index[0])
+            if heights_mm is not None:
+                about |= {"lfd:row": str(index[0]), "lfd:height-mm": repr(heights_mm[index[0]])}
             write_png(temporary / name, pictures[index], text | about)
     files = [folder / name for name in names]
     remove_others(folder, files)

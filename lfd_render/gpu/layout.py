@@ -216,13 +216,13 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("uint", "cells"),
         ("uint", "most_cells"),
     ),
-    # A block of columns to shade: row of the band << 22 | view << 12 | block of the row; its view's
-    # eye and how far that row is moved, in columns.
+    # A block of columns to shade: row of the band << 12 | block of the row; its view, that view's
+    # eye and how far the row is moved, in columns.
     "Block": (
         ("uint", "place"),
+        ("uint", "view"),
         ("float", "eye"),
         ("float", "row_offset"),
-        ("uint", "unused"),
     ),
     # Counts of the list of blocks to shade: the first three words dispatch.
     "BlockWork": (
@@ -240,8 +240,8 @@ CONSTANTS: dict[str, int] = {
     "NO_TRIANGLE": 0xFFFFFFFF,  # the word of a view pixel that shows the background
     "DOUBLE_SIDED": 1 << 16,
     "MOST_CELLS": 2048,  # of a triangle's lattice along a side, as the point-sampling view is large
-    "BOTH_SIDES": 1 << 21,  # bit of what TriangleTracks says (share/tracks.glsl)
-    "STEPS_SHIFT": 10,
+    "BOTH_SIDES": 1 << 20,  # bit of what TriangleTracks says (share/tracks.glsl)
+    "STEPS_SHIFT": 11,  # views are at most 2048
     "MOST_STEPS": 4096,  # between cells of a track, more than a window's columns
     "UNLIT": 1,  # flag of a material
     "STUDIO": 1,  # kinds of environment

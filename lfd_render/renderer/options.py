@@ -237,6 +237,13 @@ class RenderOptions:
             )
             if getattr(self, name) is not None
         ]  # fmt: skip
+        if self.technique == "exact":
+            if self.shade not in (None, "auto", "ray"):
+                raise UsageError(
+                    f"shade '{self.shade}': technique 'exact' shades each pixel by its ray; "
+                    "use it with lfdpr"
+                )
+            given = [name for name in given if name != "shade"]
         if given and self.technique != "lfdpr":
             raise UsageError(
                 f"{given[0].replace('_', ' ')} {getattr(self, given[0])!r}: technique "

@@ -218,7 +218,7 @@ class Renderer:
         size = choice.view_size or upright_size(display, display.views)
         plan = plan_views(display, choice, rig, size)
         camera = camera or camera_for(scene, display)
-        heights = (0.0,) if heights_mm is None else tuple(map(float, heights_mm))
+        heights = (0.0,) if heights_mm is None else _heights(heights_mm)
         shears = [seen_from_height(height, display.distance_mm) for height in heights]
         self._end_stage()
         with self._call():
@@ -262,7 +262,8 @@ class Renderer:
         display_from_world = camera.display_from_world(display.size_mm)
         for line, shear in enumerate(shears):
             technique.begin(Placement(shear @ display_from_world, choice.background), clock)
-            technique.warm_up(clock)
+            if line == 0:
+                technique.warm_up(clock)
             complete = False
             while not complete:
                 for index, band in enumerate(target.bands):
@@ -463,12 +464,23 @@ def _check_kinds(scene: object, display: object, camera: object, pose: object = 
     check_frame(camera, pose)
 
 
+def _heights(heights_mm: Sequence[float]) -> tuple[float, ...]:
+    """Heights as floats; raises UsageError for what is none."""
+    try:
+        heights = tuple(map(float, heights_mm))
+    except (TypeError, ValueError):
+        heights = ()
+    if not heights:
+        raise UsageError(f"heights: {heights_mm!r}; give numbers of mm, one for each line of eyes")
+    return heights
+
+
 def _check_size(plan: ViewPlan, lines: int = 1) -> None:
     """Raise ResourceError for more view pixels than anyone waits for."""
-    eyes, grid = plan.rig.views * lines, plan.rendered
+    eyes, grid = plan.rig.views, plan.rendered
     if eyes > MOST_EYES:
         raise UsageError(f"views: {eyes} eyes are too many; use at most {MOST_EYES}")
-    pixels = eyes * grid.columns * grid.rows
+    pixels = lines * eyes * grid.columns * grid.rows
     if pixels > MOST_VIEW_PIXELS:
         raise ResourceError(
             f"views: {eyes} of {grid.columns}×{grid.rows} are {pixels} pixels, more than "

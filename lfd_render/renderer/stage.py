@@ -177,7 +177,7 @@ class Stage:
             aa=plan.rule.aa,
             aa_light=choice.aa_light,
             supersample="x".join(map(str, choice.supersample)),
-            **(asdict(technique.sampling) if technique.sampling else {}),
+            **_sampling(technique, choice),
         )
         return Eia(pixels, linear, report, metadata, self.display.panel.mount)
 
@@ -196,12 +196,19 @@ def _fixed(choice: RenderOptions) -> RenderOptions:
     )
 
 
+def _sampling(technique: Technique, choice: RenderOptions) -> dict[str, Any]:
+    """How points were made and shaded; of exact, which has slices alone, how they were shaded."""
+    sampling = asdict(technique.sampling) if technique.sampling else {}
+    return {"shade": sampling["shade"]} if choice.technique == "exact" else sampling
+
+
 def _point_report(technique: Technique, choice: RenderOptions) -> dict[str, Any]:
     """What the report says of points: how they were made, how many, and what they took."""
     if technique.sampling is None:
         return {"points": 0, "splat": None}
-    sampling = asdict(technique.sampling)
-    report = {"point_source": sampling.pop("source"), **sampling, "splat": technique.winners}
+    sampling = _sampling(technique, choice)
+    source = {"point_source": sampling.pop("source")} if "source" in sampling else {}
+    report = {**source, **sampling, "splat": technique.winners}
     if not choice.effort:
         return {"points": technique.count_points() if choice.counted else None, **report}
     effort = technique.effort()

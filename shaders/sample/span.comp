@@ -1,6 +1,6 @@
 // Culling and point density, one thread a triangle (Gavane and Watson 2024, section 3.1, with rows shared
 // by all views).
-// In: Triangles, DisplayPositions, Draws, Vertices, materials. Out: Spans.
+// In: the batch, Draws, materials. Out: Spans.
 
 layout(local_size_x = 128) in;
 

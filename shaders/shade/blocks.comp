@@ -37,7 +37,7 @@ void main() {
     if (!any_here) return;
     uint place = atomicAdd(block_work.blocks, 1u), group = place / GROUP_BLOCKS;
     uint row = line / uint(frame.views), view = line % uint(frame.views);
-    blocks[place] = Block(row << 22 | view << 12 | block % row_blocks, eyes[view], row_offsets[frame.band_first + int(row)], 0u);
+    blocks[place] = Block(row << 12 | block % row_blocks, view, eyes[view], row_offsets[frame.band_first + int(row)]);
     atomicMax(block_work.groups_x, min(group + 1u, GROUPS_ACROSS));
     atomicMax(block_work.groups_y, group / GROUPS_ACROSS + 1u);
 }

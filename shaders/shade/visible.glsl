@@ -34,7 +34,7 @@ Listed listed_pixel() {
     uvec4 block = texelFetch(Blocks, beyond ? 0 : int(place));
     int column = int((block.x & 0xFFFu) * BLOCK + gl_LocalInvocationID.x);
     if (beyond || column >= frame.columns) column = -1;
-    return Listed(ivec3(column, int(block.x >> 22), int(block.x >> 12 & 0x3FFu)), uintBitsToFloat(block.y), uintBitsToFloat(block.z));
+    return Listed(ivec3(column, int(block.x >> 12), int(block.y)), uintBitsToFloat(block.z), uintBitsToFloat(block.w));
 }
 
 Visible visible_pixel() {

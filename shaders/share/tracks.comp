@@ -45,7 +45,7 @@ void main() {
     int from = max(int(rows & 0xFFFFu), first_row), to = min(int((rows & 0xFFFFu) + (rows >> 16)), end_row);
     uint word = uint(from);
     if (turns && both) {
-        word |= BOTH_SIDES | crossing_view(plane) << 22;
+        word |= BOTH_SIDES | crossing_view(plane) << 21;
     } else {
         // A single-sided one that turns away is seen ever less dense up to where it does.
         float most = max(abs(first), abs(last)), least = turns ? 0.0 : min(abs(first), abs(last));
@@ -53,5 +53,5 @@ void main() {
         float lean = (frame.eye_last - frame.eye_first) * abs(plane.normal.y) * frame.row_mm / max(most + least, 1e-30);
         groups = uint(clamp(ceil(max(by_density, lean / MOST_LEAN)), 1.0, min(float(MOST_GROUPS), float(frame.views))));
     }
-    triangle_tracks[index] = uvec2(word | groups << 16, uint(max(to - from, 0)) * groups);
+    triangle_tracks[index] = uvec2(word | (groups - 1u) << 16, uint(max(to - from, 0)) * groups);
 }

@@ -40,13 +40,15 @@ def test_arrays_are_numbered_from_the_top_left(
 ) -> None:
     folder = tmp_path / "array"
     arguments = ("views", scene, "-o", folder, "-d", display, "--views", 2, "--json")
-    result = command(*arguments, "--rows", 3, "--vertical-cone", 30)
+    result = command(*arguments, "--camera-rows", 3, "--vertical-cone", 30)
     names = [f"view_r{row:02d}_c{view:03d}.png" for row in range(3) for view in range(2)]
     assert result.json["output"] == [str(folder / name) for name in names]
-    assert (result.json["rows"], result.json["views"]) == (3, 2)
+    assert result.json["views"] == 2
     text = read_png_text(folder / names[5])
     assert (text["lfd:row"], text["lfd:view"], text["lfd:views"]) == ("2", "1", "2")
     heights = renderer.calls[-1]["heights_mm"]
+    assert result.json["heights_mm"] == heights
+    assert float(text["lfd:height-mm"]) == heights[2]
     assert heights[0] > 0 == heights[1] > heights[2]
     plain = command(*arguments)  # which ends the array that was there
     assert sorted(path.name for path in folder.iterdir()) == ["view_000.png", "view_001.png"]
@@ -56,9 +58,13 @@ def test_arrays_are_numbered_from_the_top_left(
 @pytest.mark.parametrize(
     ("options", "code", "message"),
     [
-        (("--vertical-cone", 20), 2, "--vertical-cone: is for rows of cameras; give --rows, too"),
-        (("--rows", 2, "--vertical-cone", 180), 2, "vertical cone is 180 degrees"),
-        (("--rows", 0), 2, "'--rows': Input should be greater than or equal to 1"),
+        (
+            ("--vertical-cone", 20),
+            2,
+            "--vertical-cone: is for rows of cameras; give --camera-rows, too",
+        ),
+        (("--camera-rows", 2, "--vertical-cone", 180), 2, "vertical cone is 180 degrees"),
+        (("--camera-rows", 0), 2, "'--camera-rows': Input should be greater than or equal to 1"),
     ],
 )
 def test_what_is_no_array(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lfd_render import DisplayProfile, Renderer, Scene
 from lfd_render.display import Rig, eye_heights_mm
-from lfd_render.errors import UsageError
+from lfd_render.errors import ResourceError, UsageError
 from lfd_render.gpu.device import Device
 from lfd_render.renderer import camera_for
 
@@ -92,7 +92,10 @@ def test_supersampled_lines(renderer: Renderer, scene: Scene) -> None:
 def test_what_is_no_array_is_refused(renderer: Renderer, scene: Scene) -> None:
     with pytest.raises(UsageError, match="height is nan; it should be finite"):
         renderer.views(scene, DISPLAY, views=2, heights_mm=[0.0, float("nan")], **SQUARE)
-    with pytest.raises(UsageError, match="4096 eyes are too many"):
-        renderer.views(scene, DISPLAY, views=1024, heights_mm=[0.0] * 4, **SQUARE)
+    for nothing in (3.0, [], "ab", [None]):
+        with pytest.raises(UsageError, match="one for each line of eyes"):
+            renderer.views(scene, DISPLAY, views=2, heights_mm=nothing, **SQUARE)
+    with pytest.raises(ResourceError, match="more than 4294967296; use fewer"):
+        renderer.views(scene, DISPLAY, views=1024, heights_mm=[0.0] * 300, **SQUARE)
     heights = eye_heights_mm(DISPLAY, 3, 0.5)
     assert heights[0] > 0 == heights[1] > heights[2] == -heights[0]

@@ -32,7 +32,10 @@ def test_it_is_lfdpr_by_rays_whatever_points_would_be(renderer: Renderer, scene:
         rays = renderer.render(scene, display, views=12, shade="ray", texture_limit=limit)
         np.testing.assert_array_equal(exact.pixels, rays.pixels)
     assert exact.report["technique"] == exact.metadata["lfd:technique"] == "exact"
-    assert exact.metadata["lfd:shade"] == "ray"
+    assert exact.metadata["lfd:shade"] == exact.report["shade"] == "ray"
+    assert "lfd:density" not in exact.metadata  # which points have
+    same = renderer.render(scene, display, views=12, technique="exact", shade="auto")
+    np.testing.assert_array_equal(same.pixels, exact.pixels)
     assert exact.report["points"] > 0
     shared = renderer.render(scene, display, views=12)
     assert (exact.pixels != shared.pixels).mean() > 0.01  # control: another technique
@@ -62,7 +65,7 @@ def test_hardware_sees_the_same(renderer: Renderer, scene: Scene) -> None:
     ("options", "message"),
     [
         ({"lattice": "paper"}, "lattice 'paper': technique 'exact' has no points; use it with"),
-        ({"shade": "shared"}, "shade 'shared': technique 'exact' has no points"),
+        ({"shade": "shared"}, "shade 'shared': technique 'exact' shades each pixel by its ray"),
         ({"lod": "multiview"}, "exact has no points that views share; use none or area"),
         ({"mvr": "loop-4"}, "technique 'exact' rasterises no views"),
     ],
