@@ -6,6 +6,7 @@ only one that talks to moderngl; passes see `Device`, `Kernel`, `RasterProgram`,
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -39,6 +40,7 @@ INSTALL_HINT = (
     "and run 'lfd-render doctor'"
 )
 _MAX_EGL_DEVICES = 16
+_MOST_THREADS = 16  # of llvmpipe
 
 
 @dataclass(frozen=True)
@@ -115,6 +117,16 @@ class Device:
     def name(self) -> str:
         """GL_RENDERER."""
         return self.info.renderer
+
+    @property
+    def threads(self) -> int:
+        """That share a dispatch, each with a run of its work groups: Mesa's of a device in
+        software; 1 for hardware, which has an order of its own."""
+        if not self.info.software:
+            return 1
+        asked = os.environ.get("LP_NUM_THREADS", "")
+        threads = int(asked) if asked.isdecimal() else len(os.sched_getaffinity(0))
+        return max(1, min(threads, _MOST_THREADS))
 
     def activate(self) -> None:
         """Make this the thread's current context. Whoever has several calls it before each use."""

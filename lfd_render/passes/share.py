@@ -66,6 +66,7 @@ class SharedShade:
             "GROUP_BLOCKS": GROUP_BLOCKS,
             "WORD_STRIDE": word_stride,
             "GROUPS_ACROSS": GROUPS_ACROSS,
+            "THREADS": device.threads,
             "ENCODED": int(target.encoded),
             "MOST_GROUPS": MOST_GROUPS,
             **scene.constants(),

@@ -10,8 +10,19 @@ layout(local_size_x = 64) in;
 layout(std430) readonly restrict buffer SharedWorkBlock { SharedWork shared_work; };
 layout(std430) restrict buffer Cells { uvec4 cells[]; };
 
+// This work group's place in the list. A device in software gives each of its THREADS threads a run of a dispatch's work
+// groups, and one end of the list is more work than the other: so threads take turns along it.
+uint group_in_turn() {
+    uint index = gl_WorkGroupID.y * GROUPS_ACROSS + gl_WorkGroupID.x;
+    uint run = gl_NumWorkGroups.x * gl_NumWorkGroups.y / THREADS;
+    if (THREADS == 1 || index >= run * THREADS) return index;
+    uint thread = 0u;
+    for (uint next = 1u; next < THREADS; next++) thread += uint(index >= next * run);
+    return (index - thread * run) * THREADS + thread;
+}
+
 void main() {
-    uint place = (gl_WorkGroupID.y * GROUPS_ACROSS + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
+    uint place = group_in_turn() * 64u + gl_LocalInvocationID.x;
     if (place >= min(shared_work.cells, cells.length())) return;
     uvec4 cell = cells[place];
     int row = int(cell.y & 0xFFFFu);
