@@ -199,13 +199,20 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("vec4", "turn"),  # cosine, sine of the turn about +y; intensity; the last level's number
     ),
     # A slice track's shared shading: its first cell, the column of that in the view on whose
-    # columns cells lie, steps between cells a column, and that view | number of steps <<
-    # STEPS_SHIFT.
+    # columns cells lie, steps between cells a column, and that view's eye, from the first to the
+    # last of all | number of steps << STEPS_SHIFT.
     "Track": (
         ("uint", "first_cell"),
         ("float", "from"),
         ("float", "steps_per_column"),
-        ("uint", "view_steps"),
+        ("uint", "eye_steps"),
+    ),
+    # Counts of the list of tracks that are shown: the first three words dispatch.
+    "TrackWork": (
+        ("uint", "groups_x"),
+        ("uint", "groups_y"),
+        ("uint", "groups_z"),
+        ("uint", "tracks"),
     ),
     # Cells of all tracks: what dispatches a thread for each, how many there are, and the most since
     # the host last looked.
@@ -241,7 +248,7 @@ CONSTANTS: dict[str, int] = {
     "DOUBLE_SIDED": 1 << 16,
     "MOST_CELLS": 2048,  # of a triangle's lattice along a side, as the point-sampling view is large
     "BOTH_SIDES": 1 << 20,  # bit of what TriangleTracks says (share/tracks.glsl)
-    "STEPS_SHIFT": 11,  # views are at most 2048
+    "STEPS_SHIFT": 19,
     "MOST_STEPS": 4096,  # between cells of a track, more than a window's columns
     "UNLIT": 1,  # flag of a material
     "STUDIO": 1,  # kinds of environment

@@ -15,15 +15,16 @@ _GROUP = 64  # local_size_x of prefix_sum/sum.comp and add.comp
 
 class PrefixSum:
     """Values → the sums of those before each, in place, and `total`: uint32 [2], the sum of all and
-    the most that it was since `take_most`; `dispatch` runs work groups of 64 threads, GROUPS_ACROSS
-    abreast, a thread for each unit of the total."""
+    the most that it was since `take_most`; `dispatch` runs a work group for each `group` units of
+    the total, GROUPS_ACROSS abreast."""
 
-    def __init__(self, device: Device, *, stride: int = 1) -> None:
+    def __init__(self, device: Device, *, stride: int = 1, group: int = 64) -> None:
         """stride: words from a value to the next, which is the last of so many."""
         self._device, self._stride = device, stride
         constants = {"SEGMENT": _SEGMENT, "STRIDE": stride}
         self._sum = Kernel(device, "prefix_sum/sum.comp", constants)
-        self._scan = Kernel(device, "prefix_sum/scan.comp", {"GROUPS_ACROSS": GROUPS_ACROSS})
+        dispatch = {"GROUPS_ACROSS": GROUPS_ACROSS, "GROUP_UNITS": group}
+        self._scan = Kernel(device, "prefix_sum/scan.comp", dispatch)
         self._add = Kernel(device, "prefix_sum/add.comp", constants)
         self._segments = Buffer(device, "prefix sums", 4)
         self.total = Buffer(device, "prefix sums", 8)
@@ -32,7 +33,7 @@ class PrefixSum:
 
     def __call__(self, values: Buffer, limit: Buffer, most_units: int) -> None:
         """Sum the first `limit[0]` values of a buffer, if it holds so many, else all it holds.
-        most_units: that `dispatch` runs threads for."""
+        most_units: that `dispatch` runs work groups for."""
         capacity = values.size // (4 * self._stride)
         segments = -(-capacity // _SEGMENT)
         if self._segments.size != 4 * segments:

@@ -27,7 +27,8 @@ MOST_CELLS = 7 << 20  # of a part: 112 MiB
 PIXELS_A_TRACK, PIXELS_A_CELL = 16, 8  # room at first, which suits scenes that fill the views
 HEADROOM = 1.25
 MANY_LIGHTS = 8  # with so many a scene without textures takes as long either way
-_GROUP = 64  # local_size_x of the steps that take triangles, tracks or cells
+_GROUP = 64  # local_size_x of the steps that take triangles or cells
+_LISTED_TRACKS = 512  # that a work group of share/shown.comp looks through for those shown
 
 
 def pays(scene: SceneBuffers, views: int) -> bool:
@@ -78,10 +79,13 @@ class SharedShade:
         self._blocks = Blocks(device, target, word_stride, mark=True)
         self._tracks = Kernel(device, "share/tracks.comp", constants)
         self._mark = Kernel(device, "share/mark.comp", constants)
+        self._list = Kernel(
+            device, "share/shown.comp", {**constants, "GROUP_TRACKS": _LISTED_TRACKS}
+        )
         self._places = Kernel(device, "share/places.comp", constants)
         self._matte = Kernel(device, "share/matte.comp", constants)
         self._light = Kernel(device, "share/light.comp", constants)
-        self._sum = PrefixSum(device, stride=2)
+        self._sum = PrefixSum(device, stride=2, group=_LISTED_TRACKS)
         triangles = max((batch.triangles for batch in scene.batches), default=0)
         # Two words a triangle; those of two triangles are fetched at once.
         self._of_triangles = Buffer(device, "slice tracks", 8 * (triangles + triangles % 2))
@@ -91,7 +95,8 @@ class SharedShade:
         }
         self._work = Buffer(device, "shared cells", dtype("SharedWork").itemsize)
         self._work.fill(0)
-        self._no_work = np.array([0, 0, 1, 0], np.uint32)  # without the most
+        self._listed = Buffer(device, "slice tracks", dtype("TrackWork").itemsize)
+        self._no_work = np.array([0, 0, 1, 0], np.uint32)  # without the most cells
         self._parts = 1  # of a band, so that each fits
         pixels = target.band_pixels
         self._make_room(pixels // PIXELS_A_TRACK, pixels // PIXELS_A_CELL)
@@ -101,6 +106,7 @@ class SharedShade:
         self._room = (min(max(tracks, 1), MOST_TRACKS), min(max(cells, 1), MOST_CELLS))
         tracks, cells = self._room
         self._shown = Buffer(device, "slice tracks", 4 * tracks)
+        self._track_list = Buffer(device, "slice tracks", 4 * tracks)
         self._track_records = Buffer(device, "slice tracks", dtype("Track").itemsize * tracks)
         self._cells = Buffer(device, "shared cells", 16 * cells)
 
@@ -154,10 +160,18 @@ class SharedShade:
         self._mark.set({**frame, **listed, **of_triangles, "Shown": self._shown})
         self._mark.run_indirect(self._blocks.work)
 
+        self._listed.write(self._no_work)
+        shown = {
+            "Shown": self._shown,
+            "TrackList": self._track_list,
+            "TrackWorkBlock": self._listed,
+        }
+        self._list.set({**shown, "TrackTotal": self._sum.total})
+        self._list.run_indirect(self._sum.dispatch)
+
         self._work.write(self._no_work)
-        shown = {"Shown": self._shown, "TrackTotal": self._sum.total}
         self._places.set({**geometry, **of_triangles, **shown, **eyes, **cells, **work})
-        self._places.run_indirect(self._sum.dispatch)
+        self._places.run_indirect(self._listed)
 
         self._matte.set(
             {
@@ -181,7 +195,6 @@ class SharedShade:
                 **of_triangles,
                 **cells,
                 **lighting.buffers(),
-                "Eyes": band.target.eyes,
                 "Depths": views.depths,
             },
             uniforms,
@@ -199,7 +212,7 @@ class SharedShade:
         self._work.fill(0)
         if tracks <= self._room[0] and cells <= self._room[1]:
             return False
-        for owner in (self._shown, self._track_records, self._cells):
+        for owner in (self._shown, self._track_list, self._track_records, self._cells):
             owner.release()
         wanted = (int(tracks * HEADROOM), int(cells * HEADROOM))
         parts = max(wanted[0] / MOST_TRACKS, wanted[1] / MOST_CELLS)
@@ -211,9 +224,9 @@ class SharedShade:
         """Free kernels and buffers."""
         owners: tuple[_Owner, ...] = (
             self._blocks, self._sum,
-            self._tracks, self._mark, self._places, self._matte, self._light,
+            self._tracks, self._mark, self._list, self._places, self._matte, self._light,
             self._of_triangles, *self._triangles.values(), self._work,
-            self._shown, self._track_records, self._cells,
+            self._listed, self._shown, self._track_list, self._track_records, self._cells,
         )  # fmt: skip
         for owner in owners:
             owner.release()

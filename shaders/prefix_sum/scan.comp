@@ -1,5 +1,5 @@
-// Exclusive prefix sum over the segments, in place, by one work group, the total of all, and what dispatches a thread for
-// each unit of it.
+// Exclusive prefix sum over the segments, in place, by one work group, the total of all, and what dispatches a work group
+// for each GROUP_UNITS units of it.
 // In, out: Segments. Out: Total (the total, and the most that it was since the host last looked), Dispatch.
 
 #define THREADS 256u
@@ -39,7 +39,7 @@ void main() {
     if (thread == THREADS - 1u) {
         total[0] = running;
         total[1] = max(total[1], running);
-        uint groups = (min(running, most_units) + 63u) / 64u;
+        uint groups = (min(running, most_units) + GROUP_UNITS - 1u) / GROUP_UNITS;
         dispatch[0] = min(groups, GROUPS_ACROSS);
         dispatch[1] = (groups + GROUPS_ACROSS - 1u) / GROUPS_ACROSS;
         dispatch[2] = 1u;

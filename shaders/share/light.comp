@@ -1,6 +1,6 @@
 // Lights visible view pixels: what views share, between the two cells about the place where the pixel's depth puts it in
 // its track's middle view, and the pixel's own gloss.
-// In: Words, Depths, Blocks, TriangleTracks, Tracks, Cells, Eyes. Out: view_images.
+// In: Words, Depths, Blocks, TriangleTracks, Tracks, Cells. Out: view_images.
 
 layout(local_size_x = BLOCK, local_size_y = GROUP_BLOCKS) in;
 
@@ -12,8 +12,6 @@ layout(local_size_x = BLOCK, local_size_y = GROUP_BLOCKS) in;
 #include "share/packing.glsl"
 #include "share/tracks.glsl"
 #include "layout/Track"
-
-layout(std430) readonly restrict buffer Eyes { float eyes[]; };
 
 uniform usamplerBuffer Tracks;  // a texel a Track
 uniform usamplerBuffer Cells;
@@ -33,6 +31,12 @@ uvec2 winner(uint pixel) {
 }
 #endif
 
+// The eye of the view on whose columns a track's cells lie, in columns.
+float track_eye(Track track) {
+    const uint MOST = (1u << STEPS_SHIFT) - 1u;
+    return mix(frame.eye_first, frame.eye_last, float(track.eye_steps & MOST) * (1.0 / float(MOST)));
+}
+
 void main() {
     Listed here = listed_pixel();
     ivec3 pixel = here.pixel;
@@ -44,8 +48,8 @@ void main() {
     float k = frame.distance_mm / uintBitsToFloat(seen.y), eye = here.eye, column = float(pixel.x) + 0.5;
     uvec4 texel = texelFetch(Tracks, int(track_of(tracks_of(triangle), uint(row), uint(pixel.z))));
     Track track = Track(texel.x, uintBitsToFloat(texel.y), uintBitsToFloat(texel.z), texel.w);
-    float at = column + (eyes[track.view_steps & (1u << STEPS_SHIFT) - 1u] - eye) * (1.0 - k);  // the shear identity
-    uint steps = track.view_steps >> STEPS_SHIFT;
+    float at = column + (track_eye(track) - eye) * (1.0 - k);  // the shear identity
+    uint steps = track.eye_steps >> STEPS_SHIFT;
     float along = clamp((at - track.from) * track.steps_per_column, 0.0, float(steps)), before = floor(along);
     uint first = track.first_cell, cell = min(uint(before), max(steps, 1u) - 1u), next = min(cell + 1u, steps);
     vec3 previous = radiance_from(texelFetch(Cells, int(first + max(cell, 1u) - 1u)).xy);

@@ -1,6 +1,6 @@
 // Where tracks that are shown are shaded: at places in even steps from end to end of the slice, as the middle view has
-// it, or at its middle alone if it is short. One thread a track.
-// In: the batch, Shown, TriangleTracks, TrackTotal, Eyes, RowOffsets. In, out: SharedWork. Out: Tracks, Cells (triangle, row | view << 16,
+// it, or at its middle alone if it is short. One thread a track of the list.
+// In: the batch, Shown, TriangleTracks, TrackList, TrackWork, Eyes, RowOffsets. In, out: SharedWork. Out: Tracks, Cells (triangle, row | view << 16,
 // column).
 
 layout(local_size_x = 64) in;
@@ -10,9 +10,11 @@ layout(local_size_x = 64) in;
 #include "share/tracks.glsl"
 #include "layout/Track"
 #include "layout/SharedWork"
+#include "layout/TrackWork"
 
 layout(std430) readonly restrict buffer Shown { uint shown[]; };
-layout(std430) readonly restrict buffer TrackTotal { uint track_total[]; };
+layout(std430) readonly restrict buffer TrackList { uint track_list[]; };
+layout(std430) readonly restrict buffer TrackWorkBlock { TrackWork track_work; };
 layout(std430) readonly restrict buffer Eyes { float eyes[]; };
 layout(std430) readonly restrict buffer RowOffsets { float row_offsets[]; };
 layout(std430) writeonly restrict buffer Tracks { Track tracks[]; };
@@ -25,11 +27,12 @@ const float STEPS_PER_COLUMN = 2.0;
 shared uint group_cells, group_first;
 
 void main() {
-    uint track = (gl_WorkGroupID.y * GROUPS_ACROSS + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
-    uint mark = track < min(track_total[0], shown.length()) ? shown[track] : 0u, triangle = mark - 1u;
+    uint listed = (gl_WorkGroupID.y * GROUPS_ACROSS + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
+    bool any_here = listed < track_work.tracks;
+    uint track = any_here ? track_list[listed] : 0u, triangle = any_here ? shown[track] - 1u : 0u;
     uint steps = 0u, count = 0u, row = 0u, view = 0u;
     float from = 0.0, to = 0.0;
-    if (mark != 0u) {
+    if (any_here) {
         uvec2 tracks_here = tracks_of(triangle);
         uint place = track - tracks_here.y, rows = quotient(place, groups_of(tracks_here));
         row = first_row_of(tracks_here) + rows;
@@ -57,11 +60,13 @@ void main() {
         atomicMax(shared_work.groups_y, (groups + GROUPS_ACROSS - 1u) / GROUPS_ACROSS);
     }
     barrier();
-    if (mark == 0u) return;
+    if (!any_here) return;
     place += group_first;
     bool one = steps == 0u;
     float step = one ? 0.0 : (to - from) / float(steps);
-    tracks[track] = Track(place, one ? 0.5 * (from + to) : from, one ? 0.0 : 1.0 / step, view | steps << STEPS_SHIFT);
+    float between = (eyes[view] - frame.eye_first) / max(frame.eye_last - frame.eye_first, 1e-30);
+    uint eye_word = uint(clamp(between, 0.0, 1.0) * float((1u << STEPS_SHIFT) - 1u) + 0.5);
+    tracks[track] = Track(place, one ? 0.5 * (from + to) : from, one ? 0.0 : 1.0 / step, eye_word | steps << STEPS_SHIFT);
     for (uint i = 0u; i < count; i++) {
         if (place + i >= cells.length()) return;
         float column = one ? 0.5 * (from + to) : i == steps ? to : from + float(i) * step;

@@ -212,6 +212,7 @@ def test_as_many_eyes_as_there_may_be(renderer: Renderer, shade: str) -> None:
     found = renderer.views(scene, display, shade=shade, **common).astype(int)
     raster = renderer.views(scene, display, technique="mvr", **common).astype(int)
     apart = np.abs(found - raster).mean(axis=(1, 2, 3))
-    # In so coarse views a mean of 4.6 levels by sharing, which mixes cells; 0.2 by rays.
-    assert apart.max() < (6.0 if shade == "shared" else 0.5)
+    # Of 192 pixels a few on edges are another triangle's to hardware, a mean of 1.5 levels; sharing
+    # mixes cells besides, 4.6.
+    assert apart.max() < (6.0 if shade == "shared" else 2.5)
     assert np.abs(found[:512] - raster[512:]).mean() > 10.0  # control: numbers without a bit
