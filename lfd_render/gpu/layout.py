@@ -250,6 +250,8 @@ CONSTANTS: dict[str, int] = {
     "BOTH_SIDES": 1 << 20,  # bit of what TriangleTracks says (share/tracks.glsl)
     "STEPS_SHIFT": 19,
     "MOST_STEPS": 4096,  # between cells of a track, more than a window's columns
+    "DRAW_TEXELS": 8,  # of four words, as shaders fetch them
+    "MATERIAL_TEXELS": 4,
     "UNLIT": 1,  # flag of a material
     "STUDIO": 1,  # kinds of environment
     "PICTURE": 2,

@@ -2,9 +2,7 @@
 
 uniform usamplerBuffer Draws;
 
-// Vectors of a Draw: four columns that take its vertices to display space, three that take normals to the world, and words.
-const int DRAW_TEXELS = 8;
-
+// A vector of a Draw: four columns take its vertices to display space, three take normals to the world, then come words.
 uvec4 draw_words(uint draw, int vector) {
     return texelFetch(Draws, DRAW_TEXELS * int(draw) + vector);
 }

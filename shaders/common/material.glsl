@@ -7,7 +7,6 @@ uniform usamplerBuffer Materials;  // MATERIAL_TEXELS a Material
 layout(std430) readonly restrict buffer UvTransforms { UvTransform uv_transforms[]; };
 
 const uint BASE_COLOR = 0u, METALLIC_ROUGHNESS = 1u, NORMAL = 2u, OCCLUSION = 3u, EMISSIVE = 4u;
-const int MATERIAL_TEXELS = 4;
 
 uvec4 material_texel(uint material, int texel) {
     return texelFetch(Materials, MATERIAL_TEXELS * int(material) + texel);
