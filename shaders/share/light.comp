@@ -50,8 +50,7 @@ void main() {
     Track track = Track(texel.x, uintBitsToFloat(texel.y), uintBitsToFloat(texel.z), texel.w);
     float at = column + (track_eye(track) - eye) * (1.0 - k);  // the shear identity
     uint steps = track.eye_steps >> STEPS_SHIFT;
-    // Ends lie half a step beyond the first and the last cell.
-    float along = clamp((at - track.from) * track.steps_per_column, -0.5, float(steps) + 0.5), before = floor(max(along, 0.0));
+    float along = clamp((at - track.from) * track.steps_per_column, 0.0, float(steps)), before = floor(along);
     uint first = track.first_cell, cell = min(uint(before), max(steps, 1u) - 1u), next = min(cell + 1u, steps);
     vec3 previous = radiance_from(texelFetch(Cells, int(first + max(cell, 1u) - 1u)).xy);
     vec3 following = radiance_from(texelFetch(Cells, int(first + min(cell + 2u, steps))).xy);

@@ -26,12 +26,11 @@ vec3 radiance_from(uvec2 words) {
 }
 
 // Between b and c, t of the way; radiance, which has the finest detail, by Catmull and Rom's cubic through the radiance of
-// their neighbours a and d, too, since a straight line blurs. t may lie a little beyond; what has bounds stays within them.
+// their neighbours a and d, too, since a straight line blurs.
 Matte interpolated(vec3 a, Matte b, Matte c, vec3 d, float t) {
     vec3 radiance = b.radiance + 0.5 * t * (c.radiance - a + t * (2.0 * a - 5.0 * b.radiance + 4.0 * c.radiance - d
                                                                   + t * (3.0 * (b.radiance - c.radiance) + d - a)));
     vec3 normal = mix(b.normal, c.normal, t);
-    t = clamp(t, 0.0, 1.0);
     return Matte(max(radiance, 0.0), normal * inversesqrt(max(dot(normal, normal), 1e-20)), mix(b.f0, c.f0, t),
                  mix(b.roughness, c.roughness, t), mix(b.occlusion, c.occlusion, t), b.glossy, 1.0);
 }

@@ -1,4 +1,5 @@
-// Where tracks that are shown are shaded: at the middles of equal parts of the slice, as the middle view has it. One thread a track of the list.
+// Where tracks that are shown are shaded: at places in even steps from end to end of the slice, as the middle view has
+// it, or at its middle alone if it is short. One thread a track of the list.
 // In: the batch, Shown, TriangleTracks, TrackList, TrackWork, Eyes, RowOffsets. In, out: SharedWork. Out: Tracks, Cells (triangle, row | view << 16,
 // column).
 
@@ -20,8 +21,8 @@ layout(std430) writeonly restrict buffer Tracks { Track tracks[]; };
 layout(std430) writeonly restrict buffer Cells { uvec4 cells[]; };
 layout(std430) restrict buffer SharedWorkBlock { SharedWork shared_work; };
 
-const float CELLS_PER_COLUMN = 2.0;
-const float ONE_CELL = 0.4;  // columns that one cell does for
+const float SHORT = 0.4;  // columns
+const float STEPS_PER_COLUMN = 2.0;
 
 shared uint group_cells, group_first;
 
@@ -44,7 +45,7 @@ void main() {
         if (!slice.exists) slice.a = slice.b = slice_end((p + q + r) / 3.0, offset);
         float a = column_from(slice.a, eye), b = column_from(slice.b, eye);
         from = min(a, b), to = max(a, b);
-        steps = uint(clamp(ceil(CELLS_PER_COLUMN * (to - from - ONE_CELL)), 0.0, float(MOST_STEPS)));
+        steps = to - from < SHORT ? 0u : uint(min(ceil(STEPS_PER_COLUMN * (to - from)), float(MOST_STEPS)));
         count = steps + 1u;
     }
     if (gl_LocalInvocationID.x == 0u) group_cells = 0u;
@@ -61,12 +62,14 @@ void main() {
     barrier();
     if (!any_here) return;
     place += group_first;
-    float step = (to - from) / float(count);
+    bool one = steps == 0u;
+    float step = one ? 0.0 : (to - from) / float(steps);
     float between = (eyes[view] - frame.eye_first) / max(frame.eye_last - frame.eye_first, 1e-30);
     uint eye_word = uint(clamp(between, 0.0, 1.0) * float((1u << STEPS_SHIFT) - 1u) + 0.5);
-    tracks[track] = Track(place, from + 0.5 * step, steps == 0u ? 0.0 : 1.0 / step, eye_word | steps << STEPS_SHIFT);
+    tracks[track] = Track(place, one ? 0.5 * (from + to) : from, one ? 0.0 : 1.0 / step, eye_word | steps << STEPS_SHIFT);
     for (uint i = 0u; i < count; i++) {
         if (place + i >= cells.length()) return;
-        cells[place + i] = uvec4(triangle, row | view << 16, floatBitsToUint(from + (float(i) + 0.5) * step), 0u);
+        float column = one ? 0.5 * (from + to) : i == steps ? to : from + float(i) * step;
+        cells[place + i] = uvec4(triangle, row | view << 16, floatBitsToUint(column), 0u);
     }
 }
