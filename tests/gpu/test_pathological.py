@@ -124,9 +124,9 @@ def test_the_nearest_of_all_layers_is_seen(
     ("make", "size", "most"),
     [
         # Hardware snaps corners to 1/256 of a pixel, a fiftieth of a grain, a tenth of a needle's
-        # width: in 2 and 8 % of the pixels shown another one is nearest.
+        # width: in 2 and 8 % of the pixels shown another one is nearest, of a million needles 14 %.
         (dust, (240, ROWS), 0.04),
-        (needles, (240, 160), 0.12),
+        (needles, (240, 160), 0.2),
     ],
 )
 def test_what_is_smaller_than_pixels_is_as_hardware_sees_it(
