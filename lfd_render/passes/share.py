@@ -22,7 +22,9 @@ from lfd_render.passes.view_buffers import ViewBuffers
 from lfd_render.passes.view_target import Band, ViewTarget
 
 MOST_GROUPS = 16  # of views, by which a triangle's tracks divide them
-MOST_TRACKS = 5 << 20  # of a part of a band, 100 MiB with what they show
+MOST_TRACKS = (
+    5 << 20
+)  # of a part of a band, 120 MiB with what they show and the list of those shown
 MOST_CELLS = 7 << 20  # of a part: 112 MiB
 PIXELS_A_TRACK, PIXELS_A_CELL = 16, 8  # room at first, which suits scenes that fill the views
 HEADROOM = 1.25
