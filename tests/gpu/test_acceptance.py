@@ -1,6 +1,6 @@
 """The picture as a whole: what an eye sees, how points move between views, and no holes."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -28,12 +28,6 @@ Pixels = NDArray[np.uint8]
 @pytest.fixture(scope="module")
 def display() -> DisplayProfile:
     return DisplayProfile.load("gavane-2024-tilted-4k")
-
-
-@pytest.fixture(scope="module")
-def renderer(device: Device) -> Iterator[Renderer]:
-    with Renderer(device) as renderer:
-        yield renderer
 
 
 def millimetre_camera(display: DisplayProfile) -> Camera:

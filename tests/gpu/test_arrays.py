@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from lfd_render import DisplayProfile, Renderer, Scene
 from lfd_render.display import Rig, eye_heights_mm
 from lfd_render.errors import ResourceError, UsageError
-from lfd_render.gpu.device import Device
 from lfd_render.renderer import camera_for
 
 from .helpers import PAPER, few_lenses
@@ -29,11 +28,6 @@ def square_display() -> DisplayProfile:
 
 DISPLAY = square_display()
 SQUARE: dict[str, Any] = {"view_size": (SIDE, SIDE), "seed": 3}
-
-
-@pytest.fixture(scope="module")
-def renderer(device: Device) -> Renderer:
-    return Renderer(device)
 
 
 @pytest.fixture(scope="module")

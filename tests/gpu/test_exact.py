@@ -7,17 +7,11 @@ import pytest
 
 from lfd_render import DisplayProfile, Renderer, Scene
 from lfd_render.errors import UsageError
-from lfd_render.gpu.device import Device
 from lfd_render.renderer.options import RenderOptions
 
 from .helpers import PAPER, few_lenses
 
 pytestmark = pytest.mark.needs("gl")
-
-
-@pytest.fixture(scope="module")
-def renderer(device: Device) -> Renderer:
-    return Renderer(device)
 
 
 @pytest.fixture(scope="module")

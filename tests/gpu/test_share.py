@@ -77,11 +77,6 @@ def test_groups_divide_views_in_order_about_their_middle(
         owner.release()
 
 
-@pytest.fixture(scope="module")
-def renderer(device: Device) -> Renderer:
-    return Renderer(device)
-
-
 def views_of(renderer: Renderer, scene: Scene, shade: str, views: int = VIEWS) -> NDArray[np.int64]:
     display = DisplayProfile.load(PAPER)
     found = renderer.views(scene, display, views=views, view_size=SIZE, shade=shade)

@@ -1,6 +1,5 @@
 """Supersampled, continuous and gold views: averages are averages, and bands leave no seam."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -22,12 +21,6 @@ from lfd_render.scene import Material, Scene
 from .helpers import PAPER, few_lenses, fill, mesh_of, millimetre_camera, scene_of
 
 pytestmark = pytest.mark.needs("gl")
-
-
-@pytest.fixture(scope="module")
-def renderer(device: Device) -> Iterator[Renderer]:
-    with Renderer(device) as renderer:
-        yield renderer
 
 
 @pytest.fixture(scope="module")

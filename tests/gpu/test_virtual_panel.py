@@ -1,14 +1,13 @@
 """The virtual panel against ordinary cameras: what it shows is what stood there."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from lfd_render.display import DisplayProfile, Rig
-from lfd_render.gpu.device import Device
 from lfd_render.panel.look import look_from
 from lfd_render.quality import rmse, ssim_luma
 from lfd_render.renderer import Renderer
@@ -23,12 +22,6 @@ SIZE = (640, 360)
 @pytest.fixture(scope="module")
 def display() -> DisplayProfile:
     return DisplayProfile.load("gavane-2024-tilted-4k")
-
-
-@pytest.fixture(scope="module")
-def renderer(device: Device) -> Iterator[Renderer]:
-    with Renderer(device) as renderer:
-        yield renderer
 
 
 @pytest.fixture(scope="module")

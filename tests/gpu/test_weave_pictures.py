@@ -33,11 +33,6 @@ Codes = NDArray[np.uint8]
 VIEWS = 48
 
 
-@pytest.fixture(scope="module")
-def renderer(device: Device) -> Renderer:
-    return Renderer(device)
-
-
 # ---- the published formula --------------------------------------------------------------------
 
 # Calibrations as their sources print them: pitch, slope, center, DPI, screen.
