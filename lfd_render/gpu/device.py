@@ -128,6 +128,12 @@ class Device:
         threads = int(asked) if asked.isdecimal() else len(os.sched_getaffinity(0))
         return max(1, min(threads, _MOST_THREADS))
 
+    @property
+    def lanes(self) -> int:
+        """Of a work group that loops over what there is: one vector in software, which pays for
+        the start of each."""
+        return 8 if self.info.software else 64
+
     def activate(self) -> None:
         """Make this the thread's current context. Whoever has several calls it before each use."""
         if self.closed:

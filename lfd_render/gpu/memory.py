@@ -179,8 +179,8 @@ _BYTES_PER_TEXEL = {
     gl.R32UI: 4,
     gl.DEPTH_COMPONENT32F: 4,
     gl.RGBA16F: 8,
-    gl.RG32UI: 8,
     gl.RGBA32F: 16,
+    gl.RGBA32UI: 16,
 }
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 # Names of storage and uniform blocks, and of single uniforms and uniform arrays.
 _DECLARATION = re.compile(r"\b(?:buffer|uniform)\s+(?:\w+\s+)?(\w+)\s*(?:\[[^\]]*\])?\s*[;{]")
-_IMAGE = re.compile(r"\bimage\w+\s+(\w+)\s*;")
+_IMAGE = re.compile(r"\bu?image\w+\s+(\w+)\s*;")
 
 Uniform = int | float | tuple[Any, ...] | bytes
 Texture = TextureArray | TableTexture | Buffer

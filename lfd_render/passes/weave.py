@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from typing import Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +17,6 @@ from lfd_render.passes.view_target import Band, ViewImages
 NO_ROW = 0xFFFFFFFF
 MOST_INDEXED_VIEWS = 1 << 10  # what places.frag has bits for
 MOST_INDEXED_COLUMNS = 1 << 16
-_TRIAL_ROWS = 64  # of views, woven to find the faster way
 NEAREST = Reconstruction()
 
 
@@ -43,27 +39,23 @@ class Weave:
     ) -> None:
         self._profile = profile
         self._grid = grid
-        kind: type[_Nearest | _Mixed | _Filtered]
-        if rule.aa != "none":
-            kind = _Filtered
-        else:
-            kind = _Nearest if is_exact(rule, grid) and _has_bits(grid, views) else _Mixed
         width, height = profile.resolution_px
         form = gl.RGBA8 if encoded else gl.RGBA16F
         self.panel = TextureArray(device, "panel image", (width, height, 1), form)
         self.framebuffer = LayerTarget(device, self.panel)
-        self._step: _Step = kind(device, profile, grid, views, rule)
-        if isinstance(self._step, _Nearest):
-            self._step.choose(self.panel, self.framebuffer)
+        self._step: _Nearest | _Mixed
+        if is_exact(rule, grid) and _has_bits(grid, views):
+            self._step = _Nearest(device, profile, grid, views, self.panel)
+        else:
+            kind = _Mixed if rule.aa == "none" else _Filtered
+            self._step = kind(device, profile, grid, views, rule, framebuffer=self.framebuffer)
 
     def __call__(self, shown: ViewImages | Band) -> None:
         """Weave the panel rows that show these view rows."""
         images = shown.view_images() if isinstance(shown, Band) else shown
-        width, height = self._profile.resolution_px
-        starts = self._grid.first_panel_rows(height)
+        starts = self._grid.first_panel_rows(self._profile.resolution_px[1])
         first, end = images.shown
-        self.framebuffer.use(0)
-        self._step(images, (int(starts[first]), int(starts[end])), width)
+        self._step(images, (int(starts[first]), int(starts[end])))
 
     def read_linear(self) -> NDArray[np.float16]:
         """The panel image as float16 [y, x, 3]."""
@@ -90,12 +82,6 @@ def is_exact(rule: Reconstruction, grid: ViewGrid) -> bool:
 
 def _has_bits(grid: ViewGrid, views: int) -> bool:
     return views <= MOST_INDEXED_VIEWS and grid.columns <= MOST_INDEXED_COLUMNS
-
-
-class _Step(Protocol):
-    def __call__(self, images: ViewImages, rows: tuple[int, int], width: int) -> None: ...
-
-    def release(self) -> None: ...
 
 
 class _Phases:
@@ -143,69 +129,32 @@ class _Nearest:
         profile: DisplayProfile,
         grid: ViewGrid,
         views: int,
-        _rule: Reconstruction,
+        panel: TextureArray,
     ) -> None:
-        width, height = profile.resolution_px
+        height = profile.resolution_px[1]
         phases = _Phases(device, profile, grid, views)
-        self._places = TextureArray(device, "weave", (width, height, 1), gl.RG32UI)
-        self._places.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
+        pairs = (panel.width + 1) // 2
+        self._places = TextureArray(device, "weave", (pairs, height, 1), gl.RGBA32UI)
         target = LayerTarget(device, self._places)
-        make_map = ScreenPass(device, "weave/places.frag", phases.constants)
+        constants = {**phases.constants, "PANEL_COLUMNS": panel.width}
+        make_map = ScreenPass(device, "weave/places.frag", constants)
         target.use(0)
-        make_map({}, phases.uniforms, phases.textures, (0, height), width)
+        make_map({}, phases.uniforms, phases.textures, (0, height), pairs)
         for owner in (target, make_map, phases):
             owner.release()
-        self._device, self._grid, self._views = device, grid, views
-        self._pass = ScreenPass(device, "weave/nearest.frag", phases.constants)
-        constants = {**phases.constants, "PANEL_COLUMNS": width}
+        self._panel = panel
+        constants |= {"LANES": device.lanes}
         self._kernel = Kernel(device, "weave/nearest.comp", constants)
-        self._panel: TextureArray | None = None  # what the kernel stores to, where it is the faster
 
-    def choose(self, panel: TextureArray, framebuffer: LayerTarget) -> None:
-        """Fragments or compute, the faster here: fragments on software devices, where they take
-        0.7 of the time (docs/performance.md); elsewhere what a trial says."""
-        if self._device.info.software:
-            return
-        rows = min(_TRIAL_ROWS, self._grid.rows)
-        size = (self._grid.columns, rows, self._views)
-        trial = TextureArray(self._device, "trial", size, panel.internal_format)
-        trial.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
-        trial.clear((0.0, 0.0, 0.0, 0.0))
-        images = ViewImages(trial, 0, (0, rows))
-        panel_rows = (0, int(self._grid.first_panel_rows(panel.height)[rows]))
-        times = []
-        for target in (None, panel):
-            self._panel = target
-            framebuffer.use(0)
-            times.append(self._time(images, panel_rows, panel.width))
-        self._panel = panel if times[1] < times[0] else None
-        trial.release()
-
-    def _time(self, images: ViewImages, rows: tuple[int, int], width: int) -> float:
-        """Least of a few runs, in seconds."""
-        times = []
-        for _ in range(4):
-            self._device.finish()
-            start = time.perf_counter()
-            self(images, rows, width)
-            self._device.finish()
-            times.append(time.perf_counter() - start)
-        return min(times)
-
-    def __call__(self, images: ViewImages, rows: tuple[int, int], width: int) -> None:
-        samplers: Samplers = {"places": self._places, "view_images": images.images}
-        uniforms: dict[str, Uniform] = {"first_row": images.first}
-        if self._panel is None:
-            self._pass({}, uniforms, samplers, rows, width)
-            return
+    def __call__(self, images: ViewImages, rows: tuple[int, int]) -> None:
         first, end = rows
         self._panel.bind_image(0)
-        uniforms |= {"first_panel_row": first, "end_panel_row": end}
-        self._kernel.set({}, uniforms, samplers)
-        self._kernel.run((-(-width // 32), -(-(end - first) // 8), 1))
+        self._places.bind_image(1, writeonly=False)
+        uniforms: dict[str, Uniform] = {"first_row": images.first, "first_panel_row": first}
+        self._kernel.set({}, uniforms, {"view_images": images.images})
+        self._kernel.run((end - first, 1, 1))
 
     def release(self) -> None:
-        self._pass.release()
         self._kernel.release()
         self._places.release()
 
@@ -222,8 +171,11 @@ class _Mixed:
         grid: ViewGrid,
         views: int,
         rule: Reconstruction,
+        *,
+        framebuffer: LayerTarget,
     ) -> None:
         assert rule.aa != "none" or grid.fineness == 1
+        self._framebuffer = framebuffer
         self._phases = _Phases(device, profile, grid, views)
         samples = sample_rows(profile, grid, rule)
         self._rows = TableTexture(device, "weave", samples)
@@ -246,13 +198,15 @@ class _Mixed:
             "columns_per_lens": grid.columns_at(profile)[0],
         }
 
-    def __call__(self, images: ViewImages, rows: tuple[int, int], width: int) -> None:
+    def __call__(self, images: ViewImages, rows: tuple[int, int]) -> None:
         samplers: Samplers = {
             **self._phases.textures,
             "row_samples": self._rows,
             "view_images": images.images,
         }
-        self._pass({}, {**self._uniforms, "first_row": images.first}, samplers, rows, width)
+        uniforms = {**self._uniforms, "first_row": images.first}
+        self._framebuffer.use(0)
+        self._pass({}, uniforms, samplers, rows, self._framebuffer.texture.width)
 
     def release(self) -> None:
         self._pass.release()
@@ -272,8 +226,10 @@ class _Filtered(_Mixed):
         grid: ViewGrid,
         views: int,
         rule: Reconstruction,
+        *,
+        framebuffer: LayerTarget,
     ) -> None:
-        super().__init__(device, profile, grid, views, rule)
+        super().__init__(device, profile, grid, views, rule, framebuffer=framebuffer)
         apart = rule.offsets()[:, 2]
         whole = np.floor(apart)
         fraction = np.rint((apart - whole) * 2.0**32).astype(np.int64)

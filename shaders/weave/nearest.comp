@@ -1,16 +1,33 @@
-// Weaving of nearest views, an invocation a panel pixel: nearest.frag for devices that compute faster.
-// Out: panel, rows [first_panel_row, end_panel_row).
+// Weaving of nearest views that follow the lenses: each subpixel takes its view's pixel at its lens. A work group takes a
+// panel row, a lane two of its pixels at a time: software devices pay for the start of every vector of lanes.
+// In: places, by places.frag; view_images [view, row of the band, column], linear light or codes.
+// Out: panel, the same, rows from first_panel_row on; row 0 is the panel's top row.
 
-#include "weave/nearest.glsl"
+layout(local_size_x = LANES) in;
 
-layout(local_size_x = 32, local_size_y = 8) in;
+#include "weave/rows.glsl"
 
+layout(rgba32ui, binding = 1) readonly uniform uimage2DArray places;
 layout(binding = 0) writeonly uniform image2DArray panel;
+uniform sampler2DArray view_images;
+uniform int first_row;  // view row of the images' row 0
 uniform int first_panel_row;
-uniform int end_panel_row;
+
+vec4 woven(uvec2 place, int row) {
+    int red = int(place.y & 0xFFFFu), green = red + (int(place.y << 8) >> 24), blue = red + (int(place.y) >> 24);
+    return vec4(
+        texelFetch(view_images, ivec3(red, row, int(place.x & 0x3FFu)), 0).r,
+        texelFetch(view_images, ivec3(green, row, int(place.x >> 10 & 0x3FFu)), 0).g,
+        texelFetch(view_images, ivec3(blue, row, int(place.x >> 20)), 0).b,
+        1.0
+    );
+}
 
 void main() {
-    ivec2 px = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_panel_row);
-    if (px.x >= PANEL_COLUMNS || px.y >= end_panel_row) return;
-    imageStore(panel, ivec3(px, 0), woven(px));
+    int y = first_panel_row + int(gl_WorkGroupID.x), row = view_row(y) - first_row;
+    for (int x = 2 * int(gl_LocalInvocationID.x); x < PANEL_COLUMNS; x += 2 * LANES) {
+        uvec4 two = imageLoad(places, ivec3(x / 2, y, 0));
+        imageStore(panel, ivec3(x, y, 0), woven(two.xy, row));
+        imageStore(panel, ivec3(x + 1, y, 0), woven(two.zw, row));  // beyond an odd row's end nowhere
+    }
 }
