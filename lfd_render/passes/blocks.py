@@ -14,8 +14,13 @@ from lfd_render.passes.view_buffers import Winners
 from lfd_render.passes.view_target import Band, ViewTarget
 
 BLOCK = 16  # columns of a view that go together
-GROUP_BLOCKS = 4  # blocks of a work group
 _LIST_GROUP = 64  # local_size_x of shade/blocks.comp
+
+
+def block_constants(device: Device) -> dict[str, int]:
+    """Macros of what goes over listed blocks (shaders/shade/visible.glsl)."""
+    each, abreast = (32, 1) if device.info.software else (1, 4)
+    return {"BLOCK": BLOCK, "GROUP_BLOCKS": each * abreast, "BLOCKS_ABREAST": abreast}
 
 
 class Blocks:
@@ -26,8 +31,7 @@ class Blocks:
     ) -> None:
         """mark: also tell which triangles are shown."""
         constants = {
-            "BLOCK": BLOCK,
-            "GROUP_BLOCKS": GROUP_BLOCKS,
+            **block_constants(device),
             "WORD_STRIDE": word_stride,
             "GROUPS_ACROSS": GROUPS_ACROSS,
             "MARK_TRIANGLES": int(mark),

@@ -10,7 +10,7 @@ from lfd_render.gpu.layout import lod_constants
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel, Uniform
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
-from lfd_render.passes.blocks import BLOCK, GROUP_BLOCKS, Blocks
+from lfd_render.passes.blocks import Blocks, block_constants
 from lfd_render.passes.items import GROUPS_ACROSS
 from lfd_render.passes.placement import Placement, gl_matrix
 from lfd_render.passes.sampling import DEFAULT_SAMPLING, Sampling
@@ -57,8 +57,7 @@ class Shade:
     ) -> None:
         """lod: one of LOD_RULES."""
         constants = {
-            "BLOCK": BLOCK,
-            "GROUP_BLOCKS": GROUP_BLOCKS,
+            **block_constants(device),
             "WORD_STRIDE": word_stride,
             "GROUPS_ACROSS": GROUPS_ACROSS,
             "ENCODED": int(target.encoded),

@@ -3,15 +3,19 @@
 // In: Words [row][view][column], Blocks, the batch, Eyes, RowOffsets. Out: view_images [view, row,
 // column], which already hold the background.
 
-layout(local_size_x = BLOCK, local_size_y = GROUP_BLOCKS) in;
+layout(local_size_x = BLOCK, local_size_y = BLOCKS_ABREAST) in;
 
 #include "shade/images.glsl"
 #include "shade/surface.glsl"
 #include "shade/visible.glsl"
 
-void main() {
-    Visible seen = visible_pixel();
+void shade_pixel(Visible seen) {
     if (seen.nothing) return;
     Surface surface = surface_at(seen.triangle, seen.pixel.z, frame.band_first + seen.pixel.y, seen.pixel.x);
     store(seen.pixel, shade(surface).rgb);
+}
+
+void main() {
+    uvec2 places = own_places();
+    for (uint place = places.x; place < places.y; place += BLOCKS_ABREAST) shade_pixel(visible_pixel(place));
 }

@@ -2,7 +2,7 @@
 // its track's middle view, and the pixel's own gloss.
 // In: Words, Depths, Blocks, TriangleTracks, Tracks, Cells. Out: view_images.
 
-layout(local_size_x = BLOCK, local_size_y = GROUP_BLOCKS) in;
+layout(local_size_x = BLOCK, local_size_y = BLOCKS_ABREAST) in;
 
 #include "common/frame.glsl"
 #include "common/octahedral.glsl"
@@ -37,8 +37,7 @@ float track_eye(Track track) {
     return mix(frame.eye_first, frame.eye_last, float(track.eye_steps & MOST) * (1.0 / float(MOST)));
 }
 
-void main() {
-    Listed here = listed_pixel();
+void light_pixel(Listed here) {
     ivec3 pixel = here.pixel;
     if (pixel.x < 0) return;
     uvec2 seen = winner(band_pixel(pixel));
@@ -62,4 +61,9 @@ void main() {
     vec3 p_display = vec3(eye * frame.column_mm, 0.0, frame.distance_mm) + ray / k;
     vec3 gloss = gloss_of(matte, normalize(mat3(turn_from_display) * -ray), mat3(turn_from_display) * p_display);
     store(pixel, min(matte.radiance + gloss, MOST_RADIANCE));
+}
+
+void main() {
+    uvec2 places = own_places();
+    for (uint place = places.x; place < places.y; place += BLOCKS_ABREAST) light_pixel(listed_pixel(place));
 }
