@@ -22,9 +22,9 @@ from lfd_render.passes.view_buffers import ViewBuffers
 from lfd_render.passes.view_target import Band, ViewTarget
 
 MOST_GROUPS = 16  # of views, by which a triangle's tracks divide them
-MOST_TRACKS = (
-    5 << 20
-)  # of a part of a band, 120 MiB with what they show and the list of those shown
+# Of a part of a band: 120 MiB with what they show and the list of those shown.
+MOST_TRACKS = 5 << 20
+_FIRST_TRACK = 1 << 31  # words below name triangles, the others tracks, MOST_TRACKS of each batch
 MOST_CELLS = 7 << 20  # of a part: 112 MiB
 PIXELS_A_TRACK, PIXELS_A_CELL = 16, 8  # room at first, which suits scenes that fill the views
 HEADROOM = 1.25
@@ -90,6 +90,10 @@ class SharedShade:
         triangles = max((batch.triangles for batch in scene.batches), default=0)
         # Two words a triangle; those of two triangles are fetched at once.
         self._of_triangles = Buffer(device, "slice tracks", 8 * (triangles + triangles % 2))
+        self._first_track = {
+            batch.triangle_base: _FIRST_TRACK + i * MOST_TRACKS
+            for i, batch in enumerate(scene.batches)
+        }
         self._triangles = {
             count: Buffer.of(device, "slice tracks", np.array([count], np.uint32))
             for count in {batch.triangles for batch in scene.batches}
@@ -158,7 +162,8 @@ class SharedShade:
         self._sum(self._of_triangles, self._triangles[batch.triangles], self._room[0])
 
         self._shown.fill(0)
-        self._mark.set({**frame, **listed, **of_triangles, "Shown": self._shown})
+        named: dict[str, Uniform] = {"first_track": self._first_track[batch.triangle_base]}
+        self._mark.set({**frame, **listed, **of_triangles, "Shown": self._shown}, named)
         self._mark.run_indirect(self._blocks.work)
 
         self._listed.write(self._no_work)
@@ -193,12 +198,11 @@ class SharedShade:
             {
                 **frame,
                 **listed,
-                **of_triangles,
                 **cells,
                 **lighting.buffers(),
                 "Depths": views.depths,
             },
-            uniforms,
+            {**uniforms, **named, "most_tracks": self._room[0]},
             lighting.samplers(),
         )
         self._light.run_indirect(self._blocks.work)

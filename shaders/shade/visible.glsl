@@ -4,8 +4,8 @@
 
 #include "layout/BlockWork"
 
-// Winners, each WORD_STRIDE words from the one before.
-layout(std430) readonly restrict buffer Words { uint words[]; };
+// Winners, each WORD_STRIDE words from the one before. Only share/mark.comp writes them.
+layout(std430) restrict buffer Words { uint words[]; };
 uniform usamplerBuffer Blocks;  // a texel a Block
 layout(std430) readonly restrict buffer BlockWorkBlock { BlockWork block_work; };
 

@@ -1,6 +1,6 @@
 // Lights visible view pixels: what views share, between the two cells about the place where the pixel's depth puts it in
 // its track's middle view, and the pixel's own gloss.
-// In: Words, Depths, Blocks, TriangleTracks, Tracks, Cells. Out: view_images.
+// In: Words (tracks, see mark.comp), Depths, Blocks, Tracks, Cells. Out: view_images.
 
 layout(local_size_x = BLOCK, local_size_y = BLOCKS_ABREAST) in;
 
@@ -10,16 +10,17 @@ layout(local_size_x = BLOCK, local_size_y = BLOCKS_ABREAST) in;
 #include "shade/images.glsl"
 #include "shade/visible.glsl"
 #include "share/packing.glsl"
-#include "share/tracks.glsl"
 #include "layout/Track"
 
 uniform usamplerBuffer Tracks;  // a texel a Track
 uniform usamplerBuffer Cells;
 uniform mat4 turn_from_display;  // see Placement
+uniform uint first_track;  // see mark.comp
+uniform uint most_tracks;
 
-// A pixel's triangle, counted through all batches, and the bits of its depth.
+// A pixel's word and the bits of its depth.
 #if WORD_STRIDE == 2
-uniform usamplerBuffer Depths;  // of two pixels a texel, each after its triangle
+uniform usamplerBuffer Depths;  // of two pixels a texel, each after its word
 uvec2 winner(uint pixel) {
     uvec4 two = texelFetch(Depths, int(pixel >> 1));
     return (pixel & 1u) == 0u ? two.xy : two.zw;
@@ -41,11 +42,11 @@ void light_pixel(Listed here) {
     ivec3 pixel = here.pixel;
     if (pixel.x < 0) return;
     uvec2 seen = winner(band_pixel(pixel));
-    uint triangle = seen.x - frame.triangle_base;
-    if (triangle >= frame.triangles) return;
+    uint index = seen.x - first_track;
+    if (index >= most_tracks) return;  // background, or of another batch
     int row = frame.band_first + pixel.y;
     float k = frame.distance_mm / uintBitsToFloat(seen.y), eye = here.eye, column = float(pixel.x) + 0.5;
-    uvec4 texel = texelFetch(Tracks, int(track_of(tracks_of(triangle), uint(row), uint(pixel.z))));
+    uvec4 texel = texelFetch(Tracks, int(index));
     Track track = Track(texel.x, uintBitsToFloat(texel.y), uintBitsToFloat(texel.z), texel.w);
     float at = column + (track_eye(track) - eye) * (1.0 - k);  // the shear identity
     uint steps = track.eye_steps >> STEPS_SHIFT;

@@ -32,8 +32,8 @@ void splat_cell(Cell point, int view, float eye) {
     for (int row = rows.x; row < rows.y; row++) {
         PointRow points = point_row(point.triangle, row);
         Interval seen = interval_of(points, eye);
-        int left = max(column_cut(box.columns.x + row_offsets[row]), 0);
-        int right = min(column_cut(box.columns.y + row_offsets[row]), frame.columns);
+        int left = column_cut(box.columns.x + row_offsets[row]);
+        int right = column_cut(box.columns.y + row_offsets[row]);
         boxed += max(right - left, 0);
         seen.column = max(seen.column, left);
         seen.end = min(seen.end, right);

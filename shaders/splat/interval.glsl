@@ -5,9 +5,9 @@
 
 const float ROUNDING_COLUMNS = 6e-5;  // two ulps of a column coordinate near 500
 
-// First column whose centre is not left of a position: centres on a left edge are inside.
+// First column of the view, or its end, whose centre is not left of a position: centres on a left edge are inside.
 int column_cut(float column) {
-    return int(ceil(clamp(column, -1e6, 1e6) - 0.5));
+    return int(ceil(clamp(column - 0.5, 0.0, float(frame.columns))));
 }
 
 struct Interval {
@@ -25,7 +25,7 @@ Interval interval_of(PointRow points, float eye) {
         uvec4 corners = corners_of(points.triangle);
         seen = seen && vertices_seen(position_of(corners.x), position_of(corners.y), position_of(corners.z), eye);
     }
-    int column = max(column_cut(min(a, b)), 0), end = min(column_cut(max(a, b)), frame.columns);
+    int column = column_cut(min(a, b)), end = column_cut(max(a, b));
     return Interval(column, seen ? end : column, a, b, faced);
 }
 
