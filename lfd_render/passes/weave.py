@@ -143,13 +143,16 @@ class _Nearest:
         for owner in (target, make_map, phases):
             owner.release()
         self._panel = panel
-        constants |= {"LANES": device.lanes}
+        self._encoded = panel.internal_format == gl.RGBA8
+        constants |= {"LANES": device.lanes, "ENCODED": int(self._encoded)}
         self._kernel = Kernel(device, "weave/nearest.comp", constants)
 
     def __call__(self, images: ViewImages, rows: tuple[int, int]) -> None:
         first, end = rows
         self._panel.bind_image(0)
         self._places.bind_image(1, writeonly=False)
+        if self._encoded:
+            images.images.bind_image(2, writeonly=False)
         uniforms: dict[str, Uniform] = {"first_row": images.first, "first_panel_row": first}
         self._kernel.set({}, uniforms, {"view_images": images.images})
         self._kernel.run((end - first, 1, 1))
