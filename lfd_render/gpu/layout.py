@@ -154,7 +154,7 @@ STRUCTS: dict[str, tuple[tuple[str, str], ...]] = {
         ("float", "a_depth_k"),  # D/d at the ends by the triangle's plane: edges place pixels and
         ("float", "b_depth_k"),  # must agree between triangles, depth must be the triangle's own
         ("uint", "triangle"),  # within its batch
-        ("uint", "row_sides"),  # row, and DOUBLE_SIDED above it
+        ("uint", "row_sides"),  # row, DOUBLE_SIDED, and from COLUMNS_SHIFT on a bound on columns
     ),
     # A point of the paper's lattice: a cell of its triangle's lattice, u | v << 16.
     "Cell": (
@@ -246,6 +246,7 @@ CONSTANTS: dict[str, int] = {
     "TEXTURE_ROLES": len(TEXTURE_ROLES),
     "NO_TRIANGLE": 0xFFFFFFFF,  # the word of a view pixel that shows the background
     "DOUBLE_SIDED": 1 << 16,
+    "COLUMNS_SHIFT": 17,
     "MOST_CELLS": 2048,  # of a triangle's lattice along a side, as the point-sampling view is large
     "BOTH_SIDES": 1 << 20,  # bit of what TriangleTracks says (share/tracks.glsl)
     "STEPS_SHIFT": 19,

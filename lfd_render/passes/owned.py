@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.layout import lod_constants
-from lfd_render.gpu.programs import Kernel, Samplers
+from lfd_render.gpu.memory import Buffer
+from lfd_render.gpu.programs import Kernel, Samplers, Uniform
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
 from lfd_render.passes.bin import Bin
 from lfd_render.passes.sample import PointCloud
@@ -45,18 +48,20 @@ class OwnedSplat:
         sampling: Sampling = DEFAULT_SAMPLING,
     ) -> None:
         """lod: one of LOD_RULES, for alpha."""
-        self._scene = scene
+        self._device, self._scene = device, scene
         self._bin = Bin(device, scene, target)
         views = target.rig.views
         lane_views = min(MOST_LANE_VIEWS, -(-views // 8))
         self._lanes = view_lanes(-(-views // lane_views))
         self._view_blocks = -(-views // (self._lanes * lane_views))
         constants = {**scene.constants(), **lod_constants(lod), **sampling.constants()}
+        self._rounds = Buffer(device, "bins", 12)
+        lanes = target.band_rows * self._view_blocks * self._lanes
+        self._progress = Buffer(device, "bins", 4 * lanes)
         tested = {batch.alpha_mode != "opaque" for batch in scene.batches}
-        columns = target.grid.columns * lane_views
-        self._bin_items = {
-            key: iterations_left(columns * column_loops(scene, tested=key) + 2) for key in tested
-        }
+        loops = {key: lane_views * column_loops(scene, tested=key) for key in tested}
+        each = {key: target.grid.columns * loops[key] + 2 for key in tested}  # of an item, at most
+        self._round_items = {key: iterations_left(each[key]) for key in tested}  # at least
         self._kernels = {
             key: Kernel(
                 device,
@@ -65,7 +70,8 @@ class OwnedSplat:
                     **constants,
                     "VIEW_LANES": self._lanes,
                     "LANE_VIEWS": lane_views,
-                    "BIN_ITEMS": self._bin_items[key],
+                    "COLUMN_LOOPS": loops[key],
+                    "MOST_SPENT": max(0, MOST_ITERATIONS - each[key]),
                     "ALPHA_TESTED": int(key),
                 },
             )
@@ -95,16 +101,29 @@ class OwnedSplat:
             "Draws": self._scene.draws,
             "FrameBlock": band.frame(batch),
             "Bins": self._bin.ends,
+            "Progress": self._progress,
             "Eyes": band.target.eyes,
             "RowOffsets": band.target.row_offsets,
         }
         samplers: Samplers = {**self._scene.samplers(), "binned_rows": self._bin.rows}
-        groups = band.rows, self._view_blocks, 1
-        stride = coprime_stride(band.rows)
-        for taken in range(0, self._bin.room(batch), self._bin_items[tested]):
-            uniforms = {"taken": taken, "row_stride": stride}
-            kernel.set(buffers, uniforms, samplers)
-            kernel.run(groups)
+        rounds = -(-self._bin.room(batch) // self._round_items[tested])
+        uniforms: dict[str, Uniform] = {"row_stride": coprime_stride(band.rows), "round_index": 0}
+        self._begin(rounds, band.rows)
+        kernel.set({**buffers, "Rounds": self._rounds}, uniforms, samplers)
+        for index in range(rounds):
+            kernel.change("round_index", index)
+            kernel.run_indirect(self._rounds, 12 * index)
+
+    def _begin(self, rounds: int, rows: int) -> None:
+        """Work groups for the first round; those of later ones come from what it leaves."""
+        groups = np.zeros((rounds + 1, 3), np.uint32)
+        groups[:, 1:] = self._view_blocks, 1
+        groups[0, 0] = rows
+        if self._rounds.size < groups.nbytes:
+            self._rounds.release()
+            self._rounds = Buffer(self._device, "bins", groups.nbytes)
+        self._rounds.write(groups)
+        self._progress.fill(0)
 
     def bin(self, batch: Batch, points: PointCloud, *, window: int, band: Band) -> None:
         """Sort one window of points by row, from which `fit` learns how long bins are."""
@@ -116,7 +135,8 @@ class OwnedSplat:
 
     def release(self) -> None:
         """Free the kernels."""
-        self._bin.release()
+        for owner in (self._bin, self._rounds, self._progress):
+            owner.release()
         for kernel in self._kernels.values():
             kernel.release()
 

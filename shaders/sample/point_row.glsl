@@ -6,6 +6,14 @@
 #include "common/plane.glsl"
 #include "layout/PointRow"
 
+// How many columns a view sees of a slice at most, at least one. Its length is linear in the eye; a hundredth is more
+// than rounding makes of it.
+uint most_columns(Slice slice) {
+    float first = abs(column_from(slice.a, frame.eye_first) - column_from(slice.b, frame.eye_first));
+    float last = abs(column_from(slice.a, frame.eye_last) - column_from(slice.b, frame.eye_last));
+    return uint(min(max(first, last) + 0.01, float(frame.columns))) + 1u;
+}
+
 PointRow point_row(uint triangle, int row) {
     uvec4 corners = corners_of(triangle);
     vec3 a = position_of(corners.x);
@@ -27,5 +35,5 @@ PointRow point_row(uint triangle, int row) {
     float b_mm = (column_from(slice.b, eye) - offset) * frame.column_mm;
     return PointRow(slice.a.at_centre, slice.a.k, slice.b.at_centre, slice.b.k,
                     plane_k(plane, eye * frame.column_mm, a_mm, y_mm), plane_k(plane, eye * frame.column_mm, b_mm, y_mm),
-                    triangle, uint(row) | (both ? DOUBLE_SIDED : 0u));
+                    triangle, uint(row) | (both ? DOUBLE_SIDED : 0u) | most_columns(slice) << COLUMNS_SHIFT);
 }

@@ -1,8 +1,8 @@
 // Splat points by the shear identity; a work group owns a row of the band and a block of views, so that
-// winners need no atomics. A lane takes up to three views. A dispatch takes at most BIN_ITEMS of each bin, because
-// llvmpipe ends an invocation's loops after 65,535 iterations.
-// In: binned_rows, sorted by row; Bins (where each ends). Others and outputs: splat/shear.glsl,
-// splat/visit_owned.glsl.
+// winners need no atomics. A lane takes up to three views. llvmpipe ends an invocation's loops after 65,535 iterations:
+// where a bin takes more, the next round goes on, else it has nothing to do.
+// In: binned_rows, sorted by row; Bins (where each ends). In, out: Progress; Rounds. Others and outputs:
+// splat/shear.glsl, splat/visit_owned.glsl.
 
 #extension GL_ARB_gpu_shader_int64 : require
 
@@ -15,7 +15,10 @@ layout(std430) readonly restrict buffer Bins { uint bins[]; };
 
 uniform usamplerBuffer binned_rows;  // two texels a PointRow
 
-uniform uint taken;  // items of each bin that earlier dispatches took
+layout(std430) restrict buffer Progress { uint progress[]; };  // items of its bin that each lane has taken
+layout(std430) restrict buffer Rounds { uint rounds[]; };      // three words that dispatch each
+
+uniform uint round_index;
 uniform uint row_stride;  // coprime to the rows: llvmpipe gives each thread a run of work groups
 
 PointRow binned_row(int place) {
@@ -27,16 +30,19 @@ PointRow binned_row(int place) {
 
 void main() {
     uint bin = gl_WorkGroupID.x * row_stride % gl_NumWorkGroups.x;
-    uint first = (bin == 0u ? 0u : bins[bin - 1u]) + taken;
-    uint end = min(first + BIN_ITEMS, bins[bin]);
+    uint lane = (gl_WorkGroupID.y * gl_NumWorkGroups.x + bin) * VIEW_LANES + gl_LocalInvocationID.x;
+    uint first = bin == 0u ? 0u : bins[bin - 1u], end = bins[bin], place = first + progress[lane];
     int view = int(gl_WorkGroupID.y * VIEW_LANES * LANE_VIEWS + gl_LocalInvocationID.x);
     int second = view + int(VIEW_LANES), third = second + int(VIEW_LANES);
     float eye = eyes[min(view, frame.views - 1)];
     float second_eye = eyes[min(second, frame.views - 1)], third_eye = eyes[min(third, frame.views - 1)];
-    for (uint place = first; place < end; place++) {
+    for (int spent = 0; place < end && spent <= MOST_SPENT; place++) {
         PointRow points = binned_row(int(place));
         splat_row(points, true, view, eye);
         if (LANE_VIEWS > 1) splat_row(points, true, second, second_eye);
         if (LANE_VIEWS > 2) splat_row(points, true, third, third_eye);
+        spent += 1 + COLUMN_LOOPS * int(points.row_sides >> COLUMNS_SHIFT);
     }
+    progress[lane] = place - first;
+    if (place < end && gl_LocalInvocationID.x == 0u) atomicMax(rounds[3u * round_index + 3u], gl_NumWorkGroups.x);
 }
