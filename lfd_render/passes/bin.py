@@ -1,82 +1,93 @@
-"""Binning: rows of points → the same, sorted by window row."""
+"""Binning: where the rows of points on each window row go."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from lfd_render.gpu.device import Device
-from lfd_render.gpu.layout import dtype
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
-from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
-from lfd_render.passes.items import GROUPS_ACROSS, ROWS_DISPATCH
-from lfd_render.passes.sample import PointCloud
-from lfd_render.passes.view_target import Band, ViewTarget
+from lfd_render.gpu.scene_buffers import Batch
+from lfd_render.passes.items import ITEM_STEP, Items
+from lfd_render.passes.view_target import Band
 
 _HEADROOM = 1.25  # of the room for a bin over the longest found, as for the sampler's windows
+_LANE_TRIANGLES = 64
+_LANE_LOOPS = 1 << 15  # half of what llvmpipe allows an invocation
 
 
-class Bin:
-    """PointCloud, Band → rows: PointRow [item], sorted by row of the band; ends: uint32 [row].
+@dataclass
+class Bins:
+    """A batch's bins, one for each window row of a band. ends: uint32 [row], where each begins and,
+    once they are filled, where it ends; longest: uint32, of all since `fit`; room: items of a bin
+    that splatting must take."""
 
-    A counting sort on the device. The order within a row's bin may differ from run to run.
-    """
+    ends: Buffer
+    longest: Buffer
+    room: int = 0
 
-    def __init__(self, device: Device, scene: SceneBuffers, target: ViewTarget) -> None:
-        self._device = device
-        constants = {"GROUPS_ACROSS": GROUPS_ACROSS}
-        self._count = Kernel(device, "bin/count.comp", constants)
-        self._scan = Kernel(device, "bin/scan.comp")
-        self._scatter = Kernel(device, "bin/scatter.comp", constants)
-        self._index = {batch.triangle_base: i for i, batch in enumerate(scene.batches)}
-        self._room = np.zeros(len(scene.batches), np.int64)  # [batch]
-        self._longest = Buffer(device, "bins", 4 * len(scene.batches))  # uint32 [batch]
-        self._longest.fill(0)
-        self.ends = Buffer(device, "bins", 4 * target.band_rows)
-        self.rows = Buffer(device, "binned rows", dtype("PointRow").itemsize)
-
-    def __call__(self, batch: Batch, points: PointCloud, band: Band, window: int) -> None:
-        """Sort the window of rows that was written last."""
-        if self.rows.size < points.rows.size:
-            self.rows.release()
-            self.rows = Buffer(self._device, "binned rows", points.rows.size)
-        self.ends.fill(0)
-        items = {
-            "FrameBlock": band.frame(batch),
-            "PointRows": points.rows,
-            "WorkBlock": points.work,
-            "Bins": self.ends,
-        }
-        dispatch = points.work, window * dtype("Work").itemsize + ROWS_DISPATCH
-        self._count.set(items, {"window": window})
-        self._count.run_indirect(*dispatch)
-        self._scan.set(
-            {"Bins": self.ends, "Longest": self._longest},
-            {"batch": self._index[batch.triangle_base]},
-        )
-        self._scan.run((1, 1, 1))
-        self._scatter.set({**items, "BinnedRows": self.rows}, {"window": window})
-        self._scatter.run_indirect(*dispatch)
-
-    def room(self, batch: Batch) -> int:
-        """Items of each of a batch's bins that splatting must take."""
-        return int(self._room[self._index[batch.triangle_base]])
+    @classmethod
+    def of(cls, device: Device, rows: int) -> Bins:
+        """For bands of so many rows."""
+        bins = cls(Buffer(device, "bins", 4 * rows), Buffer(device, "bins", 4))
+        bins.longest.fill(0)
+        return bins
 
     def fit(self) -> bool:
-        """Make room for the longest bins since the last call.
+        """Make room for the longest bin since the last call.
 
         Returns whether there was too little, so that what was rendered must be rendered again.
         Waits for the device: call it when a frame is done.
         """
-        longest = self._longest.read(np.uint32).astype(np.int64)
-        self._longest.fill(0)
-        short = longest > self._room
-        self._room[short] = longest[short] * _HEADROOM
-        return bool(short.any())
+        longest = int(self.longest.read(np.uint32)[0])
+        self.longest.fill(0)
+        if longest <= self.room:
+            return False
+        self.room = int(longest * _HEADROOM)
+        return True
 
     def release(self) -> None:
-        """Free the kernels and buffers."""
-        for owner in (
-            self._count, self._scan, self._scatter, self._longest, self.ends, self.rows,
-        ):  # fmt: skip
-            owner.release()
+        """Free the buffers."""
+        self.ends.release()
+        self.longest.release()
+
+
+class Bin:
+    """Items, Band → Bins.ends: where the rows of points of each window row begin, for
+    `sample/rows.comp` to write them there, by which the ends move on. A counting sort."""
+
+    def __init__(self, device: Device, band_rows: int) -> None:
+        each = max(1, min(_LANE_TRIANGLES, _LANE_LOOPS // band_rows))
+        self._group = device.lanes * each
+        constants = {
+            "LANES": device.lanes,
+            "GROUP_TRIANGLES": self._group,
+            "ITEM_STEP": ITEM_STEP,
+        }
+        self._count = Kernel(device, "bin/count.comp", constants)
+        self._scan = Kernel(device, "bin/scan.comp")
+
+    def __call__(self, batch: Batch, items: Items, bins: Bins, band: Band, window: int) -> None:
+        """Count a window's items."""
+        bins.ends.fill(0)
+        self._count.set(
+            {
+                "FrameBlock": band.frame(batch),
+                "Spans": items.spans,
+                "VisibleTriangles": items.visible,
+                "WorkBlock": items.work,
+                "ItemStarts": items.starts,
+                "Bins": bins.ends,
+            },
+            {"window": window},
+        )
+        self._count.run((-(-batch.triangles // self._group), 1, 1))
+        self._scan.set({"Bins": bins.ends, "Longest": bins.longest})
+        self._scan.run((1, 1, 1))
+
+    def release(self) -> None:
+        """Free the kernels."""
+        self._count.release()
+        self._scan.release()

@@ -11,7 +11,6 @@ from lfd_render.gpu.layout import lod_constants
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel, Samplers, Uniform
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
-from lfd_render.passes.bin import Bin
 from lfd_render.passes.sample import PointCloud
 from lfd_render.passes.sampling import DEFAULT_SAMPLING, Sampling
 from lfd_render.passes.splat import view_lanes
@@ -49,7 +48,6 @@ class OwnedSplat:
     ) -> None:
         """lod: one of LOD_RULES, for alpha."""
         self._device, self._scene = device, scene
-        self._bin = Bin(device, scene, target)
         views = target.rig.views
         lane_views = min(MOST_LANE_VIEWS, -(-views // 8))
         self._lanes = view_lanes(-(-views // lane_views))
@@ -88,9 +86,9 @@ class OwnedSplat:
         band: Band,
         views: ViewBuffers,
     ) -> None:
-        """Splat one window of points, as much of each bin as `fit` has made room for."""
+        """Splat one window of points, as much of each bin as the sampler has made room for."""
         assert step in self.steps
-        self.bin(batch, points, window=window, band=band)
+        assert points.bins
         tested = batch.alpha_mode != "opaque"
         kernel = self._kernels[tested]
         buffers = {
@@ -100,13 +98,13 @@ class OwnedSplat:
             **views.blocks(),
             "Draws": self._scene.draws,
             "FrameBlock": band.frame(batch),
-            "Bins": self._bin.ends,
+            "Bins": points.bins.ends,
             "Progress": self._progress,
             "Eyes": band.target.eyes,
             "RowOffsets": band.target.row_offsets,
         }
-        samplers: Samplers = {**self._scene.samplers(), "binned_rows": self._bin.rows}
-        rounds = -(-self._bin.room(batch) // self._round_items[tested])
+        samplers: Samplers = {**self._scene.samplers(), "binned_rows": points.rows}
+        rounds = -(-points.bins.room // self._round_items[tested])
         uniforms: dict[str, Uniform] = {"row_stride": coprime_stride(band.rows), "round_index": 0}
         self._begin(rounds, band.rows)
         kernel.set({**buffers, "Rounds": self._rounds}, uniforms, samplers)
@@ -125,17 +123,14 @@ class OwnedSplat:
         self._rounds.write(groups)
         self._progress.fill(0)
 
-    def bin(self, batch: Batch, points: PointCloud, *, window: int, band: Band) -> None:
-        """Sort one window of points by row, from which `fit` learns how long bins are."""
-        self._bin(batch, points, band, window)
-
     def fit(self) -> bool:
-        """Make room for the longest bins; whether what was splatted must be splatted again."""
-        return self._bin.fit()
+        """Whether what was splatted must be splatted again: never, since the sampler makes room for
+        the longest bins."""
+        return False
 
     def release(self) -> None:
         """Free the kernels."""
-        for owner in (self._bin, self._rounds, self._progress):
+        for owner in (self._rounds, self._progress):
             owner.release()
         for kernel in self._kernels.values():
             kernel.release()

@@ -11,6 +11,7 @@ from lfd_render.gpu.layout import dtype
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
+from lfd_render.passes.bin import Bin, Bins
 from lfd_render.passes.items import (
     GROUP_ROWS,
     GROUPS_ACROSS,
@@ -33,10 +34,12 @@ class PointCloud(Items):
     time.
 
     A row holds the points of one triangle on one window row: cells, Span.point_columns long, of
-    the densest eye's columns, which need no storage of their own.
+    the densest eye's columns, which need no storage of their own. Rows are sorted by window row
+    where there are bins.
     """
 
     rows: Buffer
+    bins: Bins | None
 
     @property
     def sizes(self) -> Buffer:
@@ -51,6 +54,8 @@ class PointCloud(Items):
         """Free the buffers."""
         super().release()
         self.rows.release()
+        if self.bins:
+            self.bins.release()
 
 
 class Sample:
@@ -69,13 +74,18 @@ class Sample:
         *,
         sampling: Sampling = DEFAULT_SAMPLING,
         whole_rows: bool = False,
+        binned_rows: int = 0,
     ) -> None:
-        """whole_rows: keep every row a triangle touches, for views that do not share their rows."""
+        """whole_rows: keep every row a triangle touches, for views that do not share their rows.
+
+        binned_rows: of a band, by which rows of points are then sorted.
+        """
         assert sampling.lattice == "rows"
         self._device = device
         self._scene = scene
         constants = {
             "WHOLE_ROWS": int(whole_rows),
+            "BINNED": int(binned_rows > 0),
             "GROUPS_ACROSS": GROUPS_ACROSS,
             "ITEM_STEP": ITEM_STEP,
             **sampling.constants(),
@@ -86,6 +96,8 @@ class Sample:
         self._rows = Kernel(device, "sample/rows.comp", constants)
         self._count = Kernel(device, "sample/count.comp", constants)
         self._total = Buffer(device, "points", 4)
+        self._binned_rows = binned_rows
+        self._bin = Bin(device, max(1, binned_rows))
 
     def allocate(self, batch: Batch) -> PointCloud:
         """Buffers for a batch's points, with room for one row until `fit` enlarges it."""
@@ -93,17 +105,20 @@ class Sample:
         return PointCloud(
             **{f.name: getattr(items, f.name) for f in fields(Items)},
             rows=Buffer(self._device, "point rows", dtype("PointRow").itemsize),
+            bins=Bins.of(self._device, self._binned_rows) if self._binned_rows else None,
         )
 
     def fit(self, points: PointCloud) -> bool:
-        """Enlarge the windows if the frames since the last call had more items than they hold.
+        """Enlarge the windows if the frames since the last call had more items than they hold, and
+        the room of bins.
 
         Returns whether they were too small, so that what was rendered must be rendered again.
         Waits for the device: call it when a frame is done.
         """
+        short = points.bins is not None and points.bins.fit()
         most = points.take_most()
         if most <= points.window_items * points.windows:
-            return False
+            return short
         wanted = min(int(most * HEADROOM), 0xFFFFFFFF - MOST_WINDOW_ITEMS)
         window_items = min(wanted, MOST_WINDOW_ITEMS)
         points.divide(self._device, -(-wanted // window_items), window_items)
@@ -131,6 +146,8 @@ class Sample:
 
     def fill(self, batch: Batch, points: PointCloud, band: Band, window: int) -> None:
         """Write the rows of one window of items."""
+        if points.bins:
+            self._bin(batch, points, points.bins, band, window)
         self._rows.set(
             {
                 **batch.geometry(),
@@ -141,6 +158,7 @@ class Sample:
                 "ItemStarts": points.starts,
                 "WorkBlock": points.work,
                 "RowOffsets": band.target.row_offsets,
+                "Bins": points.bins.ends if points.bins else points.work,
                 "PointRows": points.rows,
             },
             {"window": window},
@@ -171,5 +189,7 @@ class Sample:
 
     def release(self) -> None:
         """Free the kernels."""
-        for owner in (self._span, self._items, self._rows, self._count, self._total):
+        for owner in (
+            self._span, self._items, self._rows, self._count, self._total, self._bin,
+        ):  # fmt: skip
             owner.release()

@@ -1,4 +1,4 @@
-"""A fragment program over every pixel of a target; on llvmpipe twice as fast as compute."""
+"""A fragment program over every pixel of a target."""
 
 from __future__ import annotations
 

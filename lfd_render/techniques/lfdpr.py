@@ -17,7 +17,7 @@ from lfd_render.passes.owned import OwnedSplat
 from lfd_render.passes.pairs import CountPairs
 from lfd_render.passes.placement import Placement
 from lfd_render.passes.raster_cells import RasterCells
-from lfd_render.passes.sample import PointCloud, Sample
+from lfd_render.passes.sample import Sample
 from lfd_render.passes.sampling import DEFAULT_SAMPLING, Points, PointSource, Sampling, Splatter
 from lfd_render.passes.shade import Shade
 from lfd_render.passes.share import SharedShade, pays
@@ -70,7 +70,12 @@ class Lfdpr:
             SOURCES[sampling.source](device, scene, target, sampling)
             if cells
             else Sample(
-                device, scene, view_lanes(target.rig.views), sampling=sampling, whole_rows=general
+                device,
+                scene,
+                view_lanes(target.rig.views),
+                sampling=sampling,
+                whole_rows=general,
+                binned_rows=target.band_rows if self.winners == "owned" else 0,
             )
         )
         self._splat: Splatter = (
@@ -115,9 +120,6 @@ class Lfdpr:
                     self._source(batch, points, band)
                     for window in range(points.windows if owned or not rows else 0):
                         self._source.fill(batch, points, band, window)
-                        if isinstance(self._splat, OwnedSplat):
-                            assert isinstance(points, PointCloud)
-                            self._splat.bin(batch, points, window=window, band=band)
             if self.complete():
                 break
 

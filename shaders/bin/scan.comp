@@ -6,9 +6,7 @@
 layout(local_size_x = 256) in;
 
 layout(std430) restrict buffer Bins { uint bins[]; };
-layout(std430) restrict buffer Longest { uint longest[]; };  // [batch], over all calls
-
-uniform int batch;
+layout(std430) restrict buffer Longest { uint longest; };  // over all calls
 
 shared uint sums[THREADS];
 
@@ -22,7 +20,7 @@ void main() {
         own += bins[bin];
         most = max(most, bins[bin]);
     }
-    if (most > 0u) atomicMax(longest[batch], most);
+    if (most > 0u) atomicMax(longest, most);
     sums[thread] = own;
     barrier();
 

@@ -1,6 +1,7 @@
 // The rows of points that splatting reads: one thread an item, an item being a row of a visible
-// triangle.
-// In: the batch, Spans, VisibleTriangles, Work, RowOffsets. Out: PointRows, from the window's first.
+// triangle. Sorted by window row where BINNED is 1; the order within one is that of atomics and differs from run to run.
+// In: the batch, Spans, VisibleTriangles, Work, RowOffsets. In, out: Bins (where each begins, then where it ends), where
+// BINNED is 1. Out: PointRows, from the window's first.
 
 layout(local_size_x = 64) in;
 
@@ -8,6 +9,7 @@ layout(local_size_x = 64) in;
 #include "layout/PointRow"
 
 layout(std430) readonly restrict buffer RowOffsets { float row_offsets[]; };
+layout(std430) restrict buffer Bins { uint bins[]; };
 layout(std430) writeonly restrict buffer PointRows { PointRow point_rows[]; };
 
 #include "sample/point_row.glsl"
@@ -19,5 +21,6 @@ void main() {
     Visible seen = visible[visible_at(item)];
     Span span = spans[seen.triangle];
     int row = int((span.rows & 0xFFFFu) + item - seen.first_item);
+    if (BINNED != 0) place = atomicAdd(bins[row - frame.band_first], 1u);
     point_rows[place] = point_row(seen.triangle, row);
 }

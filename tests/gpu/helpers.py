@@ -269,6 +269,7 @@ class Passes:
         self.transform = Transform(device)
         cells = sampling.lattice == "paper"
         common = (device, self.buffers, self.target)
+        chosen = choose_winners(device, winners, ownable=not (general or cells))
         self.sample = (
             SOURCES[sampling.source](*common, sampling)
             if cells
@@ -278,9 +279,9 @@ class Passes:
                 view_lanes(rig.views),
                 sampling=sampling,
                 whole_rows=general,
+                binned_rows=self.target.band_rows if chosen == "owned" else 0,
             )
         )
-        chosen = choose_winners(device, winners, ownable=not (general or cells))
         self.int64 = chosen == "int64"
         if cells:
             self.splat = SplatCells(*common, sampling, int64=self.int64, lod=lod)
@@ -308,14 +309,9 @@ class Passes:
                 self._fill(batch, points)
                 if not self.sample.fit(points):
                     break
-        if isinstance(self.splat, OwnedSplat):
-            for band in self.target.bands:
-                for batch, points in self.batches:
-                    self.sample(batch, points, band)
-                    for window in range(points.windows):
-                        self.sample.fill(batch, points, band, window)
-                        self.splat.bin(batch, points, window=window, band=band)
-            self.splat.fit()
+            if isinstance(self.splat, OwnedSplat):
+                self._fill(batch, points)
+                self.sample.fit(points)
 
     def _fill(self, batch: Batch, points: Points) -> None:
         for band in self.target.bands:
