@@ -89,10 +89,12 @@ class Lfdpr:
         )
         self._views = make_view_buffers(device, target, self.winners)
         stride = self._views.word_stride
-        self._shade = Shade(device, scene, target, stride, lod=lod, sampling=sampling)
         self._shared: SharedShade | None = None
         if sampling.shade == "shared" and target.rig.views > 1:
             self._shared = SharedShade(device, scene, target, stride, lod=lod, sampling=sampling)
+        self._shade: Shade | None = None
+        if not self._shared or any(batch.alpha_mode == "blend" for batch in scene.batches):
+            self._shade = Shade(device, scene, target, stride, lod=lod, sampling=sampling)
         self._points: list[Points] = [self._source.allocate(batch) for batch in scene.batches]
         self._sampled: Band | None = None  # what the points are of, at the last placement
         self._make_counter = partial(
@@ -132,9 +134,12 @@ class Lfdpr:
             self._views.clear()
             self._find_winners(solid, band)
         with clock.stage("shade"):
-            (self._shared or self._shade).opaque(solid, band, self._views, self._placement)
+            shade = self._shared or self._shade
+            assert shade
+            shade.opaque(solid, band, self._views, self._placement)
         blended = [pair for pair in self._batches() if pair[0].alpha_mode == "blend"]
         if blended:
+            assert self._shade
             with clock.stage("blend"):
                 self._views.clear_words()
                 self._find_winners(blended, band)
@@ -214,9 +219,9 @@ class Lfdpr:
         self._transform.release()
         self._source.release()
         self._splat.release()
-        self._shade.release()
-        if self._shared:
-            self._shared.release()
+        for shade in (self._shade, self._shared):
+            if shade:
+                shade.release()
         self._views.release()
         self.target.release()
 
