@@ -53,7 +53,7 @@ class OwnedSplat:
         self._lanes = view_lanes(-(-views // lane_views))
         self._view_blocks = -(-views // (self._lanes * lane_views))
         constants = {**scene.constants(), **lod_constants(lod), **sampling.constants()}
-        self._rounds = Buffer(device, "bins", 12)
+        self._rounds = Buffer(device, "bins", 24)  # of one round
         lanes = target.band_rows * self._view_blocks * self._lanes
         self._progress = Buffer(device, "bins", 4 * lanes)
         tested = {batch.alpha_mode != "opaque" for batch in scene.batches}
