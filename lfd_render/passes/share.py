@@ -29,15 +29,16 @@ MOST_CELLS = 7 << 20  # of a part: 112 MiB
 PIXELS_A_TRACK, PIXELS_A_CELL = 16, 8  # room at first, which suits scenes that fill the views
 HEADROOM = 1.25
 MANY_LIGHTS = 8  # with so many a scene without textures takes as long either way
+MANY_VIEWS = 8  # with so many a scene with textures does
 _GROUP = 64  # local_size_x of the steps that take triangles or cells
 _LISTED_TRACKS = 512  # that a work group of share/shown.comp looks through for those shown
 
 
 def pays(scene: SceneBuffers, views: int) -> bool:
     """Whether sharing takes less time than shading each pixel by its ray: where there are textures
-    to filter, or many lights."""
+    to filter, or many lights, and many views that share."""
     textures, lights = scene.constants()["ROLES"], scene.lighting.constants()["LIGHTS"]
-    return views > 1 and bool(textures or lights >= MANY_LIGHTS)
+    return views >= MANY_VIEWS and bool(textures or lights >= MANY_LIGHTS)
 
 
 class _Owner(Protocol):

@@ -178,17 +178,17 @@ def lit_spheres() -> Scene:
 
 
 def test_what_is_quicker_is_chosen(renderer: Renderer) -> None:
-    """Sharing pays where there are textures to filter, or many lights."""
+    """Sharing pays with many views, where there are textures to filter, or many lights."""
     display = DisplayProfile.load(PAPER)
     plain = Scene.load("builtin:car?triangles=20000")
     lights = tuple(Light(str(i), "directional", np.eye(4)) for i in range(8))
     small: dict[str, Any] = {"view_size": (48, 36), "counted": False}
     for scene, views, expected in (
-        (plain, 3, "ray"),
-        (dataclasses.replace(plain, lights=lights[:7]), 3, "ray"),
-        (dataclasses.replace(plain, lights=lights), 3, "shared"),
-        (Scene.load("builtin:gallery?triangles=1000&textures=16"), 3, "shared"),
-        (Scene.load("builtin:gallery?triangles=1000&textures=16"), 1, "ray"),
+        (plain, 8, "ray"),
+        (dataclasses.replace(plain, lights=lights[:7]), 8, "ray"),
+        (dataclasses.replace(plain, lights=lights), 8, "shared"),
+        (Scene.load("builtin:gallery?triangles=1000&textures=16"), 8, "shared"),
+        (Scene.load("builtin:gallery?triangles=1000&textures=16"), 7, "ray"),
     ):
         chosen = renderer.render(scene, display, views=views, **small)
         asked = renderer.render(scene, display, views=views, shade=expected, **small)
