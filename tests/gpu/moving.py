@@ -26,7 +26,7 @@ from lfd_render.scene import (
     node_transform,
 )
 
-SMALL = {"views": 3, "view_size": (64, 48)}
+SMALL = {"views": 8, "view_size": (64, 48)}  # so many share what they see
 
 
 def turn(axis: int, angle_rad: float, **more: Any) -> NDArray[np.float64]:

@@ -69,10 +69,14 @@ def test_up_is_as_sideways(renderer: Renderer, scene: Scene, technique: str) -> 
     assert (np.abs(direct - other).max(axis=-1) > 8).mean() > 0.3  # control: an eye below
 
 
-def test_a_line_at_the_centre_is_the_displays_own(renderer: Renderer, scene: Scene) -> None:
-    array = renderer.views(scene, DISPLAY, views=3, heights_mm=[40.0, 0.0, -40.0], **SQUARE)
+@pytest.mark.parametrize("shade", ["ray", "shared"])
+def test_a_line_at_the_centre_is_the_displays_own(
+    renderer: Renderer, scene: Scene, shade: str
+) -> None:
+    options: dict[str, Any] = SQUARE | {"views": 3, "shade": shade}
+    array = renderer.views(scene, DISPLAY, heights_mm=[40.0, 0.0, -40.0], **options)
     assert array.shape == (3, 3, SIDE, SIDE, 3)
-    np.testing.assert_array_equal(array[1], renderer.views(scene, DISPLAY, views=3, **SQUARE))
+    np.testing.assert_array_equal(array[1], renderer.views(scene, DISPLAY, **options))
     for line in (0, 2):
         assert (array[line] != array[1]).mean() > 0.2
 

@@ -305,8 +305,10 @@ def brightest_column(picture: Float64) -> float:
     return float(np.argwhere(light >= np.quantile(light, 0.99))[:, 1].mean())
 
 
-@pytest.mark.parametrize("technique", ["lfdpr", "mvr"])
-def test_highlights_move_between_views(device: Device, technique: str) -> None:
+@pytest.mark.parametrize(
+    "options", [{"shade": "shared"}, {"shade": "ray"}, {"technique": "mvr"}], ids=str
+)
+def test_highlights_move_between_views(device: Device, options: dict[str, str]) -> None:
     """The window touches the ball's front, so what is painted there stays; the mirrored lamp
     appears to stand behind the surface and moves along with an eye that moves to the right."""
     lamp = lamp_at(0, 2, 4, 20.0)
@@ -315,7 +317,7 @@ def test_highlights_move_between_views(device: Device, technique: str) -> None:
     for material in (lit_ball().materials[0], paint):
         ball = lit_ball()
         scene = Scene("ball", ball.meshes, ball.instances, (material,), lights=(lamp,))
-        pictures = looks(device, scene, FRONT, technique=technique, environment="none")
+        pictures = looks(device, scene, FRONT, environment="none", **options)
         shifts.append(np.diff([brightest_column(picture) for picture in pictures]))
     mirrored, painted = shifts
     assert np.all(mirrored > 1.0)

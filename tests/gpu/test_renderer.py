@@ -19,7 +19,7 @@ from .helpers import fill
 
 pytestmark = pytest.mark.needs("gl")
 
-SMALL = {"views": 3, "view_size": (40, 30)}
+SMALL = {"views": 8, "view_size": (40, 30)}  # so many share what they see
 KINDS = ({}, {"technique": "mvr"}, {"technique": "mvr", "mvr": "instanced-partitioned-deferred"})
 
 

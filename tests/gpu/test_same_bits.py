@@ -24,6 +24,8 @@ from .helpers import FULL, PAPER, few_lenses
 
 pytestmark = pytest.mark.needs("gl")
 
+VIEWS = share.MANY_VIEWS  # which share what they see, by default
+
 # Options that change how a picture is made; each is held to itself in parts and anew.
 VARIANTS: dict[str, dict[str, object]] = {
     "default": {},
@@ -38,7 +40,7 @@ VARIANTS: dict[str, dict[str, object]] = {
 SAME_AS = {"two-pass": "default", "paper's lattice": "by rays"}
 # One limit lowered at a time, and all, until the work falls into parts.
 PARTS: dict[str, list[tuple[object, str, int]]] = {
-    "bands": [(view_target, "BAND_BYTES", 4 * 7 * 5 * 54)],
+    "bands": [(view_target, "BAND_BYTES", 4 * VIEWS * 5 * 54)],
     "windows": [(sample, "MOST_WINDOW_ITEMS", 301)],
     "batches": [(scene_buffers, "BATCH_TRIANGLES", 997)],
     "batches of few vertices": [(scene_buffers, "BATCH_VERTICES", 500)],
@@ -47,7 +49,7 @@ PARTS: dict[str, list[tuple[object, str, int]]] = {
     "slice tracks": [(share, "MOST_TRACKS", 3001)],
     "shared cells": [(share, "MOST_CELLS", 5003)],
     "all": [
-        (view_target, "BAND_BYTES", 4 * 7 * 11 * 54),
+        (view_target, "BAND_BYTES", 4 * VIEWS * 11 * 54),
         (sample, "MOST_WINDOW_ITEMS", 257),
         (scene_buffers, "BATCH_TRIANGLES", 1301),
         (cells, "MOST_WINDOW_POINTS", 5003),
@@ -73,10 +75,11 @@ def balls() -> Scene:
 
 
 def picture(device: Device, scene: Scene, **options: object) -> NDArray[np.uint16]:
-    """The bits of a panel image in linear light, of 7 views."""
+    """The bits of a panel image in linear light."""
     with Renderer(device) as renderer:
-        eia = renderer.render(scene, display(), views=7, **options)  # type: ignore[arg-type]
+        eia = renderer.render(scene, display(), views=VIEWS, **options)  # type: ignore[arg-type]
     assert eia.pixels.std() > 20
+    assert options or eia.report["shade"] == "shared"
     return eia.linear.view(np.uint16)
 
 
