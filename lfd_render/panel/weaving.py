@@ -41,7 +41,7 @@ def weave_pictures(
     form = gl.RGBA8 if codes else gl.SRGB8_ALPHA8
     images = TextureArray(device, "view images", (grid.columns, held, count), form)
     images.parameters(gl.NEAREST, gl.NEAREST, ("clamp", "clamp"))
-    weave = Weave(device, display, grid, count, rule, encoded=codes)
+    weave = Weave(device, display, grid, count, rule, encoded=codes, pictures=not codes)
     for start in range(0, grid.rows, step):
         end = min(start + step, grid.rows)
         first = max(0, start - rule.halo)

@@ -6,6 +6,7 @@ from lfd_render.gpu import raw as gl
 from lfd_render.gpu.device import Device
 from lfd_render.gpu.framebuffer import LayerTarget
 from lfd_render.gpu.memory import TextureArray
+from lfd_render.gpu.programs import Uniform
 from lfd_render.passes.screen import ScreenPass
 from lfd_render.passes.view_target import Band, ViewImages, ViewTarget
 
@@ -26,15 +27,11 @@ class Average:
     def __call__(self, band: Band) -> ViewImages:
         """Average a band."""
         rows = band.rows // self._times
+        band.target.images.bind_image(0, writeonly=False)
         for view in range(self.images.layers):
             self._layer.use(view)
-            self._pass(
-                {},
-                {"first_eye": view * self._eyes},
-                {"view_images": band.target.images},
-                (0, rows),
-                self.images.width,
-            )
+            uniforms: dict[str, Uniform] = {"first_eye": view * self._eyes}
+            self._pass({}, uniforms, {}, (0, rows), self.images.width)
         shown = (band.shown[0] // self._times, band.shown[1] // self._times)
         return ViewImages(self.images, band.first // self._times, shown)
 

@@ -15,6 +15,7 @@ from lfd_render.passes.screen import ScreenPass
 from lfd_render.passes.view_target import Band, ViewImages
 
 NO_ROW = 0xFFFFFFFF
+_VIEWS_UNIT = 2  # of images, in weave/views.glsl
 MOST_INDEXED_VIEWS = 1 << 10  # what places.frag has bits for
 MOST_INDEXED_COLUMNS = 1 << 16
 NEAREST = Reconstruction()
@@ -36,25 +37,33 @@ class Weave:
         rule: Reconstruction = NEAREST,
         *,
         encoded: bool = False,
+        pictures: bool = False,
     ) -> None:
-        self._profile = profile
-        self._grid = grid
+        """pictures: view images are in sRGB, not in linear light or, if encoded, codes."""
+        assert not (encoded and pictures)
+        self._device, self._profile, self._grid = device, profile, grid
+        self._loads = not pictures
         width, height = profile.resolution_px
         form = gl.RGBA8 if encoded else gl.RGBA16F
         self.panel = TextureArray(device, "panel image", (width, height, 1), form)
         self.framebuffer = LayerTarget(device, self.panel)
+        phases = _Phases(device, profile, grid, views)
+        phases.constants |= {"ENCODED": int(encoded), "PICTURES": int(pictures)}
         self._step: _Nearest | _Mixed
         if is_exact(rule, grid) and _has_bits(grid, views):
-            self._step = _Nearest(device, profile, grid, views, self.panel)
+            self._step = _Nearest(device, phases, self.panel)
         else:
             kind = _Mixed if rule.aa == "none" else _Filtered
-            self._step = kind(device, profile, grid, views, rule, framebuffer=self.framebuffer)
+            self._step = kind(device, profile, grid, rule, (phases, self.framebuffer))
 
     def __call__(self, shown: ViewImages | Band) -> None:
         """Weave the panel rows that show these view rows."""
         images = shown.view_images() if isinstance(shown, Band) else shown
         starts = self._grid.first_panel_rows(self._profile.resolution_px[1])
         first, end = images.shown
+        self._device.barrier()  # framebuffers may have drawn them
+        if self._loads:
+            images.images.bind_image(_VIEWS_UNIT, writeonly=False)
         self._step(images, (int(starts[first]), int(starts[end])))
 
     def read_linear(self) -> NDArray[np.float16]:
@@ -123,36 +132,24 @@ class _Phases:
 class _Nearest:
     """The lens's own column of the nearest view, from a map made once."""
 
-    def __init__(
-        self,
-        device: Device,
-        profile: DisplayProfile,
-        grid: ViewGrid,
-        views: int,
-        panel: TextureArray,
-    ) -> None:
-        height = profile.resolution_px[1]
-        phases = _Phases(device, profile, grid, views)
+    def __init__(self, device: Device, phases: _Phases, panel: TextureArray) -> None:
+        """The phases are released, when the map is made."""
         pairs = (panel.width + 1) // 2
-        self._places = TextureArray(device, "weave", (pairs, height, 1), gl.RGBA32UI)
+        self._places = TextureArray(device, "weave", (pairs, panel.height, 1), gl.RGBA32UI)
         target = LayerTarget(device, self._places)
-        constants = {**phases.constants, "PANEL_COLUMNS": panel.width}
+        constants = {**phases.constants, "PANEL_COLUMNS": panel.width, "LANES": device.lanes}
         make_map = ScreenPass(device, "weave/places.frag", constants)
         target.use(0)
-        make_map({}, phases.uniforms, phases.textures, (0, height), pairs)
+        make_map({}, phases.uniforms, phases.textures, (0, panel.height), pairs)
         for owner in (target, make_map, phases):
             owner.release()
         self._panel = panel
-        self._encoded = panel.internal_format == gl.RGBA8
-        constants |= {"LANES": device.lanes, "ENCODED": int(self._encoded)}
         self._kernel = Kernel(device, "weave/nearest.comp", constants)
 
     def __call__(self, images: ViewImages, rows: tuple[int, int]) -> None:
         first, end = rows
         self._panel.bind_image(0)
         self._places.bind_image(1, writeonly=False)
-        if self._encoded:
-            images.images.bind_image(2, writeonly=False)
         uniforms: dict[str, Uniform] = {"first_row": images.first, "first_panel_row": first}
         self._kernel.set({}, uniforms, {"view_images": images.images})
         self._kernel.run((end - first, 1, 1))
@@ -172,14 +169,12 @@ class _Mixed:
         device: Device,
         profile: DisplayProfile,
         grid: ViewGrid,
-        views: int,
         rule: Reconstruction,
-        *,
-        framebuffer: LayerTarget,
+        owned: tuple[_Phases, LayerTarget],
     ) -> None:
+        """owned: the phases, which are released with this, and the panel's framebuffer, not."""
         assert rule.aa != "none" or grid.fineness == 1
-        self._framebuffer = framebuffer
-        self._phases = _Phases(device, profile, grid, views)
+        self._phases, self._framebuffer = owned
         samples = sample_rows(profile, grid, rule)
         self._rows = TableTexture(device, "weave", samples)
         at_lens = rule.lookup == "lens"
@@ -227,12 +222,10 @@ class _Filtered(_Mixed):
         device: Device,
         profile: DisplayProfile,
         grid: ViewGrid,
-        views: int,
         rule: Reconstruction,
-        *,
-        framebuffer: LayerTarget,
+        owned: tuple[_Phases, LayerTarget],
     ) -> None:
-        super().__init__(device, profile, grid, views, rule, framebuffer=framebuffer)
+        super().__init__(device, profile, grid, rule, owned)
         apart = rule.offsets()[:, 2]
         whole = np.floor(apart)
         fraction = np.rint((apart - whole) * 2.0**32).astype(np.int64)

@@ -1,14 +1,13 @@
 // Interleave views through a Gaussian over view pixels, views or both (Gavane and Watson 2024, section 4), by a
 // fixed set of samples. Samples outside rows and views do not count; some sample always does.
 // In: tables of phases; row_samples [sample][y]: view row or NO_ROW, base and offset (float bits) of
-// weave/columns.glsl, the sample's columns included; view_images [view, row of the band,
-// column]. Out: panel pixels.
+// weave/columns.glsl, the sample's columns included; view_images. Out: panel pixels.
 
 #include "weave/phase.glsl"
 #include "weave/columns.glsl"
+#include "weave/views.glsl"
 
 uniform usampler2D row_samples;
-uniform sampler2DArray view_images;
 uniform int first_row;
 uniform uvec2 view_offsets[SAMPLES];  // whole views, signed, and a fraction of 2³²
 
@@ -45,7 +44,7 @@ void main() {
             int view = offset_view(phases[channel], view_offsets[n]);
             bool inside = row_inside && uint(view) < uint(VIEWS);
             ivec3 place = ivec3(clamp(column, 0, COLUMNS - 1), row, clamp(view, 0, VIEWS - 1));
-            total[channel] += inside ? texelFetch(view_images, place, 0)[channel] : 0.0;
+            total[channel] += inside ? view_pixel(place)[channel] : 0.0;
             weight[channel] += float(inside);
         }
     }

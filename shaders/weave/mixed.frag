@@ -1,19 +1,19 @@
 // Interleave views, unfiltered: nearest or linear between two views, the lens's own column or linear between
 // two columns.
 // In: tables of phases; row_samples [0][y]: view row, base and offset (float bits) of weave/columns.glsl, half a
-// column less; view_images [view, row of the band, column]. Out: panel pixels.
+// column less; view_images. Out: panel pixels.
 
 #include "weave/phase.glsl"
 #include "weave/columns.glsl"
+#include "weave/views.glsl"
 
 uniform usampler2D row_samples;
-uniform sampler2DArray view_images;
 uniform int first_row;
 
 layout(location = 0) out vec4 panel;
 
 float taken(int column, int row, int view, int channel) {
-    return texelFetch(view_images, ivec3(clamp(column, 0, COLUMNS - 1), row, clamp(view, 0, VIEWS - 1)), 0)[channel];
+    return view_pixel(ivec3(clamp(column, 0, COLUMNS - 1), row, clamp(view, 0, VIEWS - 1)))[channel];
 }
 
 void main() {

@@ -1,25 +1,15 @@
 // Weaving of nearest views that follow the lenses: each subpixel takes its view's pixel at its lens. A work group takes a
 // panel row, a lane two of its pixels at a time: software devices pay for the start of every vector of lanes.
-// In: places, by places.frag; view_images in linear light, or view_codes, [view, row of the band, column].
+// In: places, by places.frag; view_images.
 // Out: panel, the same, rows from first_panel_row on; row 0 is the panel's top row.
 
 layout(local_size_x = LANES) in;
 
 #include "weave/rows.glsl"
+#include "weave/views.glsl"
 
 layout(rgba32ui, binding = 1) readonly uniform uimage2DArray places;
 layout(binding = 0) writeonly uniform image2DArray panel;
-#if ENCODED
-layout(rgba8, binding = 2) readonly uniform image2DArray view_codes;
-vec4 view_pixel(ivec3 at) {
-    return imageLoad(view_codes, at);  // in software a little faster than a fetch
-}
-#else
-uniform sampler2DArray view_images;
-vec4 view_pixel(ivec3 at) {
-    return texelFetch(view_images, at, 0);
-}
-#endif
 uniform int first_row;  // view row of the images' row 0
 uniform int first_panel_row;
 
