@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from lfd_render.gpu.device import Device
-from lfd_render.gpu.layout import lod_constants
+from lfd_render.gpu.layout import CONSTANTS, lod_constants
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel, Samplers, Uniform
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
@@ -57,6 +57,7 @@ class OwnedSplat:
         lanes = target.band_rows * self._view_blocks * self._lanes
         self._progress = Buffer(device, "bins", 4 * lanes)
         tested = {batch.alpha_mode != "opaque" for batch in scene.batches}
+        assert target.grid.columns < 1 << (32 - CONSTANTS["COLUMNS_SHIFT"])
         loops = {key: lane_views * column_loops(scene, tested=key) for key in tested}
         each = {key: target.grid.columns * loops[key] + 2 for key in tested}  # of an item, at most
         self._round_items = {key: iterations_left(each[key]) for key in tested}  # at least
@@ -129,7 +130,7 @@ class OwnedSplat:
         return False
 
     def release(self) -> None:
-        """Free the kernels."""
+        """Free kernels and buffers."""
         for owner in (self._rounds, self._progress):
             owner.release()
         for kernel in self._kernels.values():

@@ -97,7 +97,7 @@ class Sample:
         self._count = Kernel(device, "sample/count.comp", constants)
         self._total = Buffer(device, "points", 4)
         self._binned_rows = binned_rows
-        self._bin = Bin(device, max(1, binned_rows))
+        self._bin = Bin(device, binned_rows) if binned_rows else None
 
     def allocate(self, batch: Batch) -> PointCloud:
         """Buffers for a batch's points, with room for one row until `fit` enlarges it."""
@@ -146,7 +146,7 @@ class Sample:
 
     def fill(self, batch: Batch, points: PointCloud, band: Band, window: int) -> None:
         """Write the rows of one window of items."""
-        if points.bins:
+        if self._bin and points.bins:
             self._bin(batch, points, points.bins, band, window)
         self._rows.set(
             {
@@ -189,7 +189,7 @@ class Sample:
 
     def release(self) -> None:
         """Free the kernels."""
-        for owner in (
-            self._span, self._items, self._rows, self._count, self._total, self._bin,
-        ):  # fmt: skip
+        for owner in (self._span, self._items, self._rows, self._count, self._total):
             owner.release()
+        if self._bin:
+            self._bin.release()

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from lfd_render.gpu.device import Device
-from lfd_render.gpu.layout import dtype, lod_constants
+from lfd_render.gpu.layout import CONSTANTS, dtype, lod_constants
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel, Uniform
 from lfd_render.gpu.scene_buffers import Batch, SceneBuffers
@@ -24,7 +24,7 @@ from lfd_render.passes.view_target import Band, ViewTarget
 MOST_GROUPS = 16  # of views, by which a triangle's tracks divide them
 # Of a part of a band: 120 MiB with what they show and the list of those shown.
 MOST_TRACKS = 5 << 20
-_FIRST_TRACK = 1 << 31  # words below name triangles, the others tracks, MOST_TRACKS of each batch
+_FIRST_TRACK = 1 << 31  # words below name triangles, the others tracks
 MOST_CELLS = 7 << 20  # of a part: 112 MiB
 PIXELS_A_TRACK, PIXELS_A_CELL = 16, 8  # room at first, which suits scenes that fill the views
 HEADROOM = 1.25
@@ -91,8 +91,10 @@ class SharedShade:
         triangles = max((batch.triangles for batch in scene.batches), default=0)
         # Two words a triangle; those of two triangles are fetched at once.
         self._of_triangles = Buffer(device, "slice tracks", 8 * (triangles + triangles % 2))
+        words = CONSTANTS["NO_TRIANGLE"] - _FIRST_TRACK
+        self._most_tracks = min(MOST_TRACKS, words // max(1, len(scene.batches)))
         self._first_track = {
-            batch.triangle_base: _FIRST_TRACK + i * MOST_TRACKS
+            batch.triangle_base: _FIRST_TRACK + i * self._most_tracks
             for i, batch in enumerate(scene.batches)
         }
         self._triangles = {
@@ -109,7 +111,7 @@ class SharedShade:
 
     def _make_room(self, tracks: int, cells: int) -> None:
         device = self._device
-        self._room = (min(max(tracks, 1), MOST_TRACKS), min(max(cells, 1), MOST_CELLS))
+        self._room = (min(max(tracks, 1), self._most_tracks), min(max(cells, 1), MOST_CELLS))
         tracks, cells = self._room
         self._shown = Buffer(device, "slice tracks", 4 * tracks)
         self._track_list = Buffer(device, "slice tracks", 4 * tracks)
@@ -221,7 +223,7 @@ class SharedShade:
         for owner in (self._shown, self._track_list, self._track_records, self._cells):
             owner.release()
         wanted = (int(tracks * HEADROOM), int(cells * HEADROOM))
-        parts = max(wanted[0] / MOST_TRACKS, wanted[1] / MOST_CELLS)
+        parts = max(wanted[0] / self._most_tracks, wanted[1] / MOST_CELLS)
         self._parts = math.ceil(self._parts * max(1.0, parts))
         self._make_room(max(self._room[0], wanted[0]), max(self._room[1], wanted[1]))
         return True

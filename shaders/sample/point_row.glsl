@@ -11,7 +11,7 @@
 uint most_columns(Slice slice) {
     float first = abs(column_from(slice.a, frame.eye_first) - column_from(slice.b, frame.eye_first));
     float last = abs(column_from(slice.a, frame.eye_last) - column_from(slice.b, frame.eye_last));
-    return uint(min(max(first, last) + 0.01, float(frame.columns))) + 1u;
+    return uint(min(max(first, last) + 0.01, float(frame.columns - 1))) + 1u;
 }
 
 PointRow point_row(uint triangle, int row) {

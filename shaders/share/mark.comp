@@ -15,7 +15,7 @@ void mark_pixel(Visible seen) {
     if (seen.nothing) return;
     uint track = track_of(tracks_of(seen.triangle), uint(frame.band_first + seen.pixel.y), uint(seen.pixel.z));
     words[WORD_STRIDE * band_pixel(seen.pixel)] = first_track + track;
-    if (track >= shown.length()) return;
+    if (track >= shown.length()) return;  // the frame is rendered again, with more room
     shown[track] = seen.triangle + 1u;  // the same from all its pixels
 }
 

@@ -128,6 +128,27 @@ def test_rows_longer_than_a_device_loops_are_splatted_whole(
     assert_same(expected, divided(device, scene, rig, grid, winners="owned"))
 
 
+@pytest.mark.parametrize("columns", [1364, 1365, 1820])
+def test_items_as_wide_as_views_leave_none_out(device: Device, columns: int) -> None:
+    """Three views a lane, and alpha tested, a round takes a few such items, or one fewer."""
+    profile = DisplayProfile.load(PAPER)
+    rig, grid = profile.rig(24), ViewGrid.upright(profile, columns, 3)
+    # Walls that touch a parabola, each nearest about its own place.
+    place_mm = np.linspace(-0.4, 0.4, 16) * profile.size_mm[0]
+    corners = np.zeros((len(place_mm), 3, 3))
+    corners[..., 0] = np.array([-40, 40, 0]) * profile.size_mm[0]
+    corners[..., 1] = np.array([-9, -9, 9]) * profile.size_mm[1]
+    corners[..., 2] = 2e-4 * place_mm[:, None] * (2 * corners[..., 0] - place_mm[:, None])
+    scene = scene_of(
+        mesh_of(corners), materials=(Material("cut", double_sided=True, alpha_mode="mask"),)
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bin_pass, "_HEADROOM", 1)
+        found = divided(device, scene, rig, grid, winners="owned")
+    assert_same(found, divided(device, scene, rig, grid, winners="two-pass"))
+    assert len(np.unique(found.solid)) == len(place_mm)
+
+
 def test_a_dispatch_left_out_is_seen(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     profile = DisplayProfile.load(PAPER)
     rig, grid = profile.rig(3), ViewGrid.upright(profile, 500, 3)

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from lfd_render import DisplayProfile, Renderer, Scene
+from lfd_render.gpu.device import Device
 from lfd_render.scene import Material
 
 from .helpers import FULL, PAPER, mesh_of, millimetre_camera, scene_of
@@ -83,17 +84,17 @@ def scene_with(make: Callable[..., Corners], count: int) -> tuple[Scene, Corners
 
 
 def seen(
-    renderer: Renderer, scene: Scene, make: Callable[..., Corners], size: tuple[int, int],
+    device: Device, scene: Scene, make: Callable[..., Corners], size: tuple[int, int],
     **options: Any,
 ) -> NDArray:  # fmt: skip
     """Pictures, within bounds of memory: points are made in windows of so many, whatever their
     number, so that only triangles and vertices take ever more room."""
-    ledger = renderer.device.ledger
-    before = ledger.total  # of other tests, too
-    pictures = renderer.views(
-        scene, DISPLAY, millimetre_camera(DISPLAY.size_mm), views=VIEWS, view_size=size, **options
-    )
-    assert ledger.peak - before < 1.5e6 * MEASURED_MB[make][FULL]
+    before = device.ledger.total  # of other tests
+    camera = millimetre_camera(DISPLAY.size_mm)
+    with Renderer(device) as renderer:
+        pictures = renderer.views(scene, DISPLAY, camera, views=VIEWS, view_size=size, **options)
+        peak = device.ledger.peak
+    assert peak - before < 1.5e6 * MEASURED_MB[make][FULL]
     return pictures
 
 
@@ -105,10 +106,10 @@ def codes(linear: Corners) -> Corners:
 @pytest.mark.parametrize(("make", "shown"), [(layers, ROWS), (strips, 1)])
 @pytest.mark.parametrize("technique", ["lfdpr", "exact"])
 def test_the_nearest_of_all_layers_is_seen(
-    renderer: Renderer, make: Callable[..., Corners], shown: int, technique: str
+    device: Device, make: Callable[..., Corners], shown: int, technique: str
 ) -> None:
     scene, z_mm, colors = scene_with(make, COUNT)
-    pictures = seen(renderer, scene, make, (24, ROWS), technique=technique)
+    pictures = seen(device, scene, make, (24, ROWS), technique=technique)
     lit = pictures[(pictures != BLACK).any(axis=-1)]
     assert len(lit) == VIEWS * shown * 24
     nearest, second = np.argsort(-z_mm)[:2]
@@ -126,12 +127,12 @@ def test_the_nearest_of_all_layers_is_seen(
     ],
 )
 def test_what_is_smaller_than_pixels_is_as_hardware_sees_it(
-    renderer: Renderer, make: Callable[..., Corners], size: tuple[int, int], most: float
+    device: Device, make: Callable[..., Corners], size: tuple[int, int], most: float
 ) -> None:
     scene, _, _ = scene_with(make, COUNT)
-    points = seen(renderer, scene, make, size)
-    np.testing.assert_array_equal(points, seen(renderer, scene, make, size, technique="exact"))
-    hardware = seen(renderer, scene, make, size, technique="mvr", mvr="multipass-deferred")
+    points = seen(device, scene, make, size)
+    np.testing.assert_array_equal(points, seen(device, scene, make, size, technique="exact"))
+    hardware = seen(device, scene, make, size, technique="mvr", mvr="multipass-deferred")
     differ = (np.abs(points.astype(int) - hardware) > 1).any(axis=-1)
     shown = (points != BLACK).any(axis=-1) | (hardware != BLACK).any(axis=-1)
     assert shown.sum() > 1000

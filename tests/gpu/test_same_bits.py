@@ -47,6 +47,10 @@ PARTS: dict[str, list[tuple[object, str, int]]] = {
     "dispatches": [(owned, "MOST_ITERATIONS", 60)],
     "lists of cells": [(cells, "MOST_WINDOW_POINTS", 4001)],
     "slice tracks": [(share, "MOST_TRACKS", 3001)],
+    "words for tracks": [
+        (share, "_FIRST_TRACK", 0xFFFFFFFF - 16_000),
+        (scene_buffers, "BATCH_TRIANGLES", 1301),
+    ],
     "shared cells": [(share, "MOST_CELLS", 5003)],
     "all": [
         (view_target, "BAND_BYTES", 4 * VIEWS * 11 * 54),
