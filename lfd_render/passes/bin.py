@@ -10,7 +10,7 @@ from lfd_render.gpu.device import Device
 from lfd_render.gpu.memory import Buffer
 from lfd_render.gpu.programs import Kernel
 from lfd_render.gpu.scene_buffers import Batch
-from lfd_render.passes.items import ITEM_STEP, Items
+from lfd_render.passes.items import GROUPS_ACROSS, ITEM_STEP, Items
 from lfd_render.passes.view_target import Band
 
 _HEADROOM = 1.25  # of the room for a bin over the longest found, as for the sampler's windows
@@ -64,6 +64,7 @@ class Bin:
         constants = {
             "LANES": device.lanes,
             "GROUP_TRIANGLES": self._group,
+            "GROUPS_ACROSS": GROUPS_ACROSS,
             "ITEM_STEP": ITEM_STEP,
         }
         self._count = Kernel(device, "bin/count.comp", constants)
@@ -83,7 +84,9 @@ class Bin:
             },
             {"window": window},
         )
-        self._count.run((-(-batch.triangles // self._group), 1, 1))
+        groups = -(-batch.triangles // self._group)
+        across = min(groups, GROUPS_ACROSS)
+        self._count.run((across, -(-groups // across), 1))
         self._scan.set({"Bins": bins.ends, "Longest": bins.longest})
         self._scan.run((1, 1, 1))
 

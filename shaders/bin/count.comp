@@ -11,7 +11,7 @@ layout(std430) restrict buffer Bins { uint bins[]; };
 
 void main() {
     uint window_first = work[window].first_item, window_end = window_first + work[window].items;
-    uint first = gl_WorkGroupID.x * GROUP_TRIANGLES, end = min(first + GROUP_TRIANGLES, work[window].visible);
+    uint first = (gl_WorkGroupID.y * GROUPS_ACROSS + gl_WorkGroupID.x) * GROUP_TRIANGLES, end = min(first + GROUP_TRIANGLES, work[window].visible);
     for (uint i = first + gl_LocalInvocationID.x; i < end; i += LANES) {
         Visible seen = visible[i];
         uint rows = spans[seen.triangle].rows;

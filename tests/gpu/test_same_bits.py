@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from lfd_render import DisplayProfile, Renderer, Scene
 from lfd_render.gpu import scene_buffers
 from lfd_render.gpu.device import Device
+from lfd_render.passes import bin as bin_pass
 from lfd_render.passes import cells, owned, sample, share, view_target
 from lfd_render.scene import Mesh
 
@@ -45,6 +46,7 @@ PARTS: dict[str, list[tuple[object, str, int]]] = {
     "batches": [(scene_buffers, "BATCH_TRIANGLES", 997)],
     "batches of few vertices": [(scene_buffers, "BATCH_VERTICES", 500)],
     "dispatches": [(owned, "MOST_ITERATIONS", 60)],
+    "lists of triangles": [(bin_pass, "_LANE_LOOPS", 1), (bin_pass, "GROUPS_ACROSS", 3)],
     "lists of cells": [(cells, "MOST_WINDOW_POINTS", 4001)],
     "slice tracks": [(share, "MOST_TRACKS", 3001)],
     "words for tracks": [
