@@ -283,7 +283,10 @@ class TextureArray(Owned):
         self._device.raw.glBindTextureUnit(unit, self.name)
 
     def bind_image(self, unit: int, *, writeonly: bool = True, level: int = 0) -> None:
-        """Make a level what image stores, and loads unless writeonly, of this unit reach."""
+        """Make a level what image stores, and loads unless writeonly, of this unit reach. Loads see
+        what was drawn before."""
+        if not writeonly:
+            self._device.barrier()
         access = gl.WRITE_ONLY if writeonly else gl.READ_WRITE
         raw = self._device.raw
         raw.glBindImageTexture(unit, self.name, level, 1, 0, access, self.internal_format)

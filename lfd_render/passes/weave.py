@@ -41,7 +41,7 @@ class Weave:
     ) -> None:
         """pictures: view images are in sRGB, not in linear light or, if encoded, codes."""
         assert not (encoded and pictures)
-        self._device, self._profile, self._grid = device, profile, grid
+        self._profile, self._grid = profile, grid
         self._loads = not pictures
         width, height = profile.resolution_px
         form = gl.RGBA8 if encoded else gl.RGBA16F
@@ -54,16 +54,16 @@ class Weave:
             self._step = _Nearest(device, phases, self.panel)
         else:
             kind = _Mixed if rule.aa == "none" else _Filtered
-            self._step = kind(device, profile, grid, rule, (phases, self.framebuffer))
+            self._step = kind(device, profile, grid, rule, phases)
 
     def __call__(self, shown: ViewImages | Band) -> None:
         """Weave the panel rows that show these view rows."""
         images = shown.view_images() if isinstance(shown, Band) else shown
         starts = self._grid.first_panel_rows(self._profile.resolution_px[1])
         first, end = images.shown
-        self._device.barrier()  # framebuffers may have drawn them
         if self._loads:
             images.images.bind_image(_VIEWS_UNIT, writeonly=False)
+        self.framebuffer.use(0)
         self._step(images, (int(starts[first]), int(starts[end])))
 
     def read_linear(self) -> NDArray[np.float16]:
@@ -133,7 +133,7 @@ class _Nearest:
     """The lens's own column of the nearest view, from a map made once."""
 
     def __init__(self, device: Device, phases: _Phases, panel: TextureArray) -> None:
-        """The phases are released, when the map is made."""
+        """The phases are released when the map is made."""
         pairs = (panel.width + 1) // 2
         self._places = TextureArray(device, "weave", (pairs, panel.height, 1), gl.RGBA32UI)
         target = LayerTarget(device, self._places)
@@ -170,11 +170,11 @@ class _Mixed:
         profile: DisplayProfile,
         grid: ViewGrid,
         rule: Reconstruction,
-        owned: tuple[_Phases, LayerTarget],
+        phases: _Phases,
     ) -> None:
-        """owned: the phases, which are released with this, and the panel's framebuffer, not."""
+        """The phases are released with this."""
         assert rule.aa != "none" or grid.fineness == 1
-        self._phases, self._framebuffer = owned
+        self._phases, self._width = phases, profile.resolution_px[0]
         samples = sample_rows(profile, grid, rule)
         self._rows = TableTexture(device, "weave", samples)
         at_lens = rule.lookup == "lens"
@@ -203,8 +203,7 @@ class _Mixed:
             "view_images": images.images,
         }
         uniforms = {**self._uniforms, "first_row": images.first}
-        self._framebuffer.use(0)
-        self._pass({}, uniforms, samplers, rows, self._framebuffer.texture.width)
+        self._pass({}, uniforms, samplers, rows, self._width)
 
     def release(self) -> None:
         self._pass.release()
@@ -223,9 +222,9 @@ class _Filtered(_Mixed):
         profile: DisplayProfile,
         grid: ViewGrid,
         rule: Reconstruction,
-        owned: tuple[_Phases, LayerTarget],
+        phases: _Phases,
     ) -> None:
-        super().__init__(device, profile, grid, rule, owned)
+        super().__init__(device, profile, grid, rule, phases)
         apart = rule.offsets()[:, 2]
         whole = np.floor(apart)
         fraction = np.rint((apart - whole) * 2.0**32).astype(np.int64)
