@@ -124,11 +124,6 @@ class OwnedSplat:
         self._rounds.write(groups)
         self._progress.fill(0)
 
-    def fit(self) -> bool:
-        """Whether what was splatted must be splatted again: never, since the sampler makes room for
-        the longest bins."""
-        return False
-
     def release(self) -> None:
         """Free kernels and buffers."""
         for owner in (self._rounds, self._progress):

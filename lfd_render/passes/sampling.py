@@ -128,10 +128,6 @@ class Splatter(Protocol):
         """Splat the window filled last."""
         ...
 
-    def fit(self) -> bool:
-        """Make room for what frames since the last call needed; whether there was too little."""
-        ...
-
     def release(self) -> None:
         """Free the kernels."""
         ...

@@ -95,10 +95,6 @@ class Splat:
         )
         kernel.run_indirect(points.work, window * dtype("Work").itemsize)
 
-    def fit(self) -> bool:
-        """Whether what was splatted must be splatted again: never, since a call takes all rows."""
-        return False
-
     def release(self) -> None:
         """Free the kernels."""
         for kernel in self._kernels.values():

@@ -78,10 +78,6 @@ class SplatCells:
             kernel.set(buffers, strip, self._scene.samplers())
             kernel.run_indirect(points.work)
 
-    def fit(self) -> bool:
-        """Whether what was splatted must be splatted again: the source of points knows."""
-        return False
-
     def release(self) -> None:
         """Free the kernels."""
         for kernel in self._kernels.values():

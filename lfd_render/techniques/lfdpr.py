@@ -162,7 +162,7 @@ class Lfdpr:
 
     def complete(self) -> bool:
         """Whether there was room for all points since the last call; if not, there is now."""
-        enlarged = [self._source.fit(points) for points in self._points] + [self._splat.fit()]
+        enlarged = [self._source.fit(points) for points in self._points]
         if self._shared:
             enlarged.append(self._shared.fit())
         return not any(enlarged)
