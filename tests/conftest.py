@@ -6,8 +6,10 @@ full counts of the acceptance lines (``make verify``).
 
 import importlib.util
 import os
+import shutil
 from collections import Counter
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import hypothesis
@@ -43,12 +45,18 @@ def _video_problem() -> str | None:
     return None if importlib.util.find_spec("av") else "PyAV is not installed (extra [video])"
 
 
+def _lacks(command: str) -> str | None:
+    return None if shutil.which(command) else f"{command} is not installed"
+
+
 PROBLEMS: dict[str, Callable[[], str | None]] = {
     "gl": system.gl_problem,
     "zink": _zink_problem,
     "browser": system.browser_problem,
     "ray": _ray_problem,
     "video": _video_problem,
+    "curl": partial(_lacks, "curl"),
+    "kubectl": partial(_lacks, "kubectl"),
 }
 
 

@@ -1,6 +1,5 @@
 """The README's lines about the server work as they stand there, and docs/service.md says it all."""
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,8 +16,7 @@ def server(start: Start) -> Iterator[Server]:
         yield server
 
 
-@pytest.mark.needs("gl")
-@pytest.mark.skipif(not shutil.which("curl"), reason="[curl] curl is not installed")
+@pytest.mark.needs("gl", "curl")
 @pytest.mark.shows("the README's curl lines give the command line's EIA, bit for bit")
 def test_the_readmes_lines_give_the_command_lines_picture(
     server: Server, triangle: bytes, tmp_path: Path

@@ -1,6 +1,5 @@
 """The application on Ray Serve answers as the server does."""
 
-import shutil
 import socket
 import subprocess
 import sys
@@ -46,7 +45,7 @@ def url() -> Iterator[str]:
         yield f"http://127.0.0.1:{port}"
 
 
-@pytest.mark.skipif(not shutil.which("curl"), reason="[curl] curl is not installed")
+@pytest.mark.needs("curl")
 @pytest.mark.shows("Ray Serve: the README's curl lines, on two cores")
 def test_the_readmes_lines_on_ray_serve(url: str, triangle: bytes, tmp_path: Path) -> None:
     run_readme(url, triangle, tmp_path)

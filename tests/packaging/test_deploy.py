@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -81,7 +80,7 @@ def test_compose_builds_the_targets() -> None:
         assert "LFD_API_KEYS" in service["environment"]  # it would not start without
 
 
-@pytest.mark.skipif(not shutil.which("kubectl"), reason="[kubectl] kubectl is not installed")
+@pytest.mark.needs("kubectl")
 @pytest.mark.parametrize("overlay", OVERLAYS)
 def test_overlays_are_built(overlay: str) -> None:
     folder = DEPLOY / "kubernetes" / overlay
